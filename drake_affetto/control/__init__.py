@@ -1,0 +1,1 @@
+"""The PIDF valve controller."""

@@ -1,0 +1,1 @@
+"""From the camera's image to task parameters."""

@@ -1,0 +1,1 @@
+"""Valves, chambers and joint friction of the pneumatic actuators."""

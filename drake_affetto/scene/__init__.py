@@ -1,0 +1,1 @@
+"""The world: models, joints, the drum's place and its workspace."""

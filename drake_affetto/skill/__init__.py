@@ -1,0 +1,1 @@
+"""The parameterised skill (an ELM) and its transfer to a new view."""

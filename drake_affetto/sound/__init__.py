@@ -1,0 +1,1 @@
+"""The drum's voice, and how a recording becomes a reward."""

@@ -1,0 +1,1 @@
+"""Kinesthetic teaching and the demonstrations it leaves."""
