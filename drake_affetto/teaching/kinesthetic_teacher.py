@@ -1,0 +1,237 @@
+"""The system that pulls the robot's hand as a person does."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import (
+    ExternallyAppliedSpatialForce,
+    MultibodyPlant,
+)
+from pydrake.multibody.tree import JacobianWrtVariable
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiscreteValues,
+    InputPort,
+    LeafSystem,
+    OutputPort,
+)
+
+from drake_affetto.errors import require
+from drake_affetto.teaching.stroke import (
+    Stroke,
+    TeacherConfig,
+    TeacherState,
+    advance_teacher,
+    intended_position,
+    tremor_force,
+)
+
+
+class KinestheticTeacher(LeafSystem):
+    """A person who leads the robot's palm along a stroke (paper Sec. V).
+
+    The teacher takes hold of the palm at `start_time`, wherever it is then,
+    and pulls at that one point, with a force and no torque. Without a stroke
+    the output is an empty list.
+
+    .. pydrake_system::
+
+        name: KinestheticTeacher
+        input_ports:
+        - estimated_state
+        output_ports:
+        - spatial_force
+        - pulling_force
+
+    - estimated_state: (2n) angles and rates of the led joints, rad, rad/s.
+    - spatial_force: list[ExternallyAppliedSpatialForce], at most one entry.
+    - pulling_force: (3) the same force on the palm, in the world, N.
+
+    The stroke and its start are an abstract parameter; see `set_stroke`.
+    """
+
+    def __init__(
+        self,
+        plant: MultibodyPlant,
+        joint_names: Sequence[str],
+        config: TeacherConfig,
+        palm_frame: str = "right_palm",
+    ):
+        """Reads the palm from a finalized `plant`.
+
+        Args:
+            plant: holds the robot; only its kinematics are used.
+            joint_names: the n joints of `estimated_state`, in its order.
+            palm_frame: the frame whose origin is pulled.
+
+        Raises:
+            InputError: if `config` does not fit.
+        """
+        super().__init__()
+        config.check("teaching")
+        self._config = config
+        self._plant = plant
+        self._plant_context = plant.CreateDefaultContext()
+        joints = [plant.GetJointByName(name) for name in joint_names]
+        self._q_index = np.array([j.position_start() for j in joints])
+        self._v_index = np.array([j.velocity_start() for j in joints])
+        self._palm = plant.GetFrameByName(palm_frame)
+        self._body = self._palm.body()
+        self._p_BoPalm = self._palm.GetFixedPoseInBodyFrame().translation()
+        n = len(joints)
+        self._n = n
+        self._dt = 1.0 / config.update_rate
+
+        self._state_port = self.DeclareVectorInputPort(
+            name="estimated_state", size=2 * n
+        )
+        self._stroke_index = self.DeclareAbstractParameter(
+            Value({"stroke": None, "start_time": np.inf})
+        )
+        # held (0/1), grasp (3), intention (3), its rate (3), correction (3),
+        # force (3)
+        self._memory = self.DeclareDiscreteState(16)
+        self.DeclarePeriodicDiscreteUpdateEvent(
+            period_sec=self._dt, offset_sec=0.0, update=self._update
+        )
+        self._force_port = self.DeclareAbstractOutputPort(
+            name="spatial_force",
+            alloc=lambda: Value([ExternallyAppliedSpatialForce()]),
+            calc=self._calc_spatial_force,
+            prerequisites_of_calc={self.xd_ticket()},
+        )
+        self._pulling_port = self.DeclareVectorOutputPort(
+            name="pulling_force",
+            size=3,
+            calc=self._calc_pulling_force,
+            prerequisites_of_calc={self.xd_ticket()},
+        )
+
+    def get_estimated_state_input_port(self) -> InputPort:
+        """The (2n) angles and rates of the led joints."""
+        return self._state_port
+
+    def get_spatial_force_output_port(self) -> OutputPort:
+        """The list for MultibodyPlant's applied_spatial_force."""
+        return self._force_port
+
+    def get_pulling_force_output_port(self) -> OutputPort:
+        """The force on the palm, (3) N in the world."""
+        return self._pulling_port
+
+    def set_posture(self, q: np.ndarray) -> None:
+        """Tells the teacher's eye where the joints that are not led stand.
+
+        Args:
+            q: (nq,) positions of the whole plant; those of the led joints
+                are replaced by the input's at each update.
+        """
+        self._plant.SetPositions(self._plant_context, q)
+
+    def set_stroke(
+        self, context: Context, stroke: Stroke | None, start_time: float
+    ) -> None:
+        """Sets what is taught, and when the palm is grasped.
+
+        Args:
+            stroke: the intended motion, or None to let go of the robot.
+            start_time: s; must be finite where there is a stroke.
+        """
+        require(
+            stroke is None or np.isfinite(start_time),
+            "start_time",
+            start_time,
+            "a finite time where there is a stroke",
+        )
+        context.get_mutable_abstract_parameter(self._stroke_index).set_value(
+            {"stroke": stroke, "start_time": float(start_time)}
+        )
+        # The next update grasps the palm anew.
+        context.get_mutable_discrete_state(self._memory).SetFromVector(
+            np.zeros(16)
+        )
+
+    def palm(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Position and velocity of the palm, (3,) m and (3,) m/s in the world.
+
+        Args:
+            state: (2n) as in `estimated_state`.
+        """
+        plant, context, world = (
+            self._plant,
+            self._plant_context,
+            self._plant.world_frame(),
+        )
+        q = plant.GetPositions(context)
+        q[self._q_index] = state[: self._n]
+        plant.SetPositions(context, q)
+        X_WB = self._body.EvalPoseInWorld(context)
+        J = plant.CalcJacobianTranslationalVelocity(
+            context,
+            JacobianWrtVariable.kV,
+            self._body.body_frame(),
+            self._p_BoPalm,
+            world,
+            world,
+        )
+        return X_WB @ self._p_BoPalm, J[:, self._v_index] @ state[self._n :]
+
+    def _update(self, context: Context, values: DiscreteValues) -> None:
+        lesson = context.get_abstract_parameter(self._stroke_index).get_value()
+        stroke, start_time = lesson["stroke"], lesson["start_time"]
+        memory = values.get_mutable_value(self._memory)
+        # Half an update of slack: a start on the grid is not missed by 1 ulp.
+        t = context.get_time() - start_time
+        if stroke is None or t < -0.5 * self._dt:
+            memory[:] = 0.0
+            return
+        palm, velocity = self.palm(self._state_port.Eval(context))
+        if memory[0] == 0.0:
+            memory[0] = 1.0
+            memory[1:4] = palm
+            state = TeacherState.at(palm)
+        elif t > self._config.duration:
+            # The demonstration is over: the teacher lets go.
+            memory[13:16] = 0.0
+            return
+        else:
+            state = TeacherState(
+                memory[4:7], memory[7:10], memory[10:13], memory[13:16]
+            )
+        state = advance_teacher(
+            self._config,
+            state,
+            intended_position(stroke, memory[1:4].copy(), max(t, 0.0)),
+            palm,
+            velocity,
+            tremor_force(stroke, t),
+            self._dt,
+        )
+        memory[4:16] = np.concatenate(
+            [
+                state.intention,
+                state.intention_rate,
+                state.correction,
+                state.force,
+            ]
+        )
+
+    def _calc_spatial_force(self, context: Context, output: Value) -> None:
+        memory = context.get_discrete_state(self._memory).value()
+        if memory[0] == 0.0:
+            output.set_value([])
+            return
+        force = ExternallyAppliedSpatialForce()
+        force.body_index = self._body.index()
+        force.p_BoBq_B = self._p_BoPalm
+        force.F_Bq_W = SpatialForce(tau=np.zeros(3), f=memory[13:16])
+        output.set_value([force])
+
+    def _calc_pulling_force(
+        self, context: Context, output: BasicVector
+    ) -> None:
+        memory = context.get_discrete_state(self._memory).value()
+        output.SetFromVector(memory[13:16])
