@@ -1,0 +1,383 @@
+"""The world a trial happens in: robot, table, mirror, and a drum to place.
+
+Everything here reads names, limits and sizes from the parsed models; nothing
+is repeated in code. All functions that take a `context` want the plant's own
+context, i.e. `plant.GetMyContextFromRoot(root_context)`.
+"""
+
+from collections.abc import Mapping, Sequence
+import dataclasses
+import difflib
+
+import numpy as np
+from pydrake.geometry import Box, Cylinder, Role, SceneGraphInspector
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import FixedOffsetFrame, RevoluteJoint, RigidBody
+from pydrake.systems.framework import Context
+
+from drake_affetto.errors import InputError, require, require_range
+from drake_affetto.resources import configure_parser, resolve
+
+_PLACEMENT = "drum_placement"
+
+
+@dataclasses.dataclass
+class WorldConfig:
+    """Which models make the world.
+
+    Args:
+        directives: model directives of everything but the drum. They must
+            weld `affetto::pelvis`, `table::table_top` (through a frame
+            `table_pose`) and `mirror::mirror` to the world.
+        drum: model of the drum; its root link is the one that stands on the
+            table.
+        drum_position: where the drum stands in a default context, world
+            x and y [m].
+        default_posture: joint -> angle [rad] of the default context; joints
+            that are not named stand at zero.
+    """
+
+    directives: str = "package://drake_affetto/scenes/drumming.dmd.yaml"
+    drum: str = "package://drake_affetto/sdf/drum.sdf"
+    drum_position: list[float] = dataclasses.field(
+        default_factory=lambda: [0.235, -0.09]
+    )
+    default_posture: dict[str, float] = dataclasses.field(default_factory=dict)
+
+    def check(self, where: str) -> None:
+        """Raises InputError naming the first field that does not fit."""
+        for field in ("directives", "drum"):
+            try:
+                resolve(getattr(self, field))
+            except InputError as error:
+                raise InputError(f"{where}.{field}: {error}") from None
+        require(
+            len(self.drum_position) == 2,
+            f"{where}.drum_position",
+            self.drum_position,
+            "two numbers (x and y in metres)",
+        )
+        for i, value in enumerate(self.drum_position):
+            require_range(f"{where}.drum_position[{i}]", value, -10, 10)
+        for name, angle in self.default_posture.items():
+            require_range(
+                f"{where}.default_posture.{name}", angle, -np.pi, np.pi
+            )
+
+
+def add_world(plant: MultibodyPlant, config: WorldConfig) -> None:
+    """Adds the models of `config` to `plant`, which must not be finalized.
+
+    The drum stands on the frame `drum_placement`, an offset from the world
+    that is a parameter of the context (`set_drum_position`).
+
+    Raises:
+        InputError: for a file that is missing, a scene that lacks a part, or
+            a posture beyond the joints' limits.
+    """
+    config.check("world")
+    parser = Parser(plant)
+    configure_parser(parser)
+    for path in (config.directives, config.drum):
+        if path == config.drum:
+            _require_scene(plant, config.directives)
+        if path.startswith("package://"):
+            models = parser.AddModelsFromUrl(path)
+        else:
+            models = parser.AddModels(path)
+    drum = models[0]
+    X_WT = plant.GetFrameByName("table_pose").GetFixedPoseInBodyFrame()
+    placement = plant.AddFrame(
+        FixedOffsetFrame(
+            _PLACEMENT,
+            plant.world_frame(),
+            RigidTransform([*config.drum_position, X_WT.translation()[2]]),
+        )
+    )
+    root = plant.get_body(plant.GetBodyIndices(drum)[0])
+    plant.WeldFrames(placement, root.body_frame())
+    check_posture(plant, config.default_posture, "world.default_posture")
+    for name, angle in config.default_posture.items():
+        get_joint(plant, name).set_default_angle(angle)
+
+
+def _require_scene(plant: MultibodyPlant, uri: str) -> None:
+    for name, has in (
+        ("model affetto", plant.HasModelInstanceNamed("affetto")),
+        ("body table_top", plant.HasBodyNamed("table_top")),
+        ("frame table_pose", plant.HasFrameNamed("table_pose")),
+        ("frame mirror", plant.HasFrameNamed("mirror")),
+    ):
+        if not has:
+            raise InputError(f"{uri} has no {name}")
+
+
+def get_joint(plant: MultibodyPlant, name: str) -> RevoluteJoint:
+    """The robot's joint `name`.
+
+    Raises:
+        InputError: if there is none; the message offers the nearest name.
+    """
+    robot = plant.GetModelInstanceByName("affetto")
+    if not plant.HasJointNamed(name, robot):
+        known = joint_names(plant)
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise InputError(f"the robot has no joint {name!r}{hint}")
+    return plant.GetJointByName(name, robot)
+
+
+def joint_names(plant: MultibodyPlant) -> list[str]:
+    """The names of the robot's actuated joints, in the model's order."""
+    robot = plant.GetModelInstanceByName("affetto")
+    return [
+        plant.get_joint(i).name()
+        for i in plant.GetJointIndices(robot)
+        if plant.get_joint(i).num_positions() == 1
+    ]
+
+
+def joint_limits(
+    plant: MultibodyPlant, names: Sequence[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper limits [rad] of the joints `names`, each (n,)."""
+    joints = [get_joint(plant, name) for name in names]
+    return (
+        np.array([joint.position_lower_limit() for joint in joints]),
+        np.array([joint.position_upper_limit() for joint in joints]),
+    )
+
+
+def effort_limits(plant: MultibodyPlant, names: Sequence[str]) -> np.ndarray:
+    """Effort limits [N m] of the actuators of the joints `names`, (n,)."""
+    return np.array(
+        [plant.GetJointActuatorByName(n).effort_limit() for n in names]
+    )
+
+
+def check_posture(
+    plant: MultibodyPlant, posture: Mapping[str, float], where: str
+) -> None:
+    """Raises InputError for an unknown joint or an angle beyond its limits."""
+    for name, angle in posture.items():
+        try:
+            joint = get_joint(plant, name)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+        require_range(
+            f"{where}.{name}",
+            angle,
+            joint.position_lower_limit(),
+            joint.position_upper_limit(),
+        )
+
+
+def set_posture(
+    plant: MultibodyPlant, context: Context, posture: Mapping[str, float]
+) -> None:
+    """Sets the joints named in `posture` [rad], at rest.
+
+    Raises:
+        InputError: for an unknown joint or an angle beyond its limits.
+    """
+    check_posture(plant, posture, "posture")
+    for name, angle in posture.items():
+        joint = get_joint(plant, name)
+        joint.set_angle(context, angle)
+        joint.set_angular_rate(context, 0.0)
+
+
+def get_posture(plant: MultibodyPlant, context: Context) -> dict[str, float]:
+    """All of the robot's joint angles [rad] by name."""
+    return {
+        name: get_joint(plant, name).get_angle(context)
+        for name in joint_names(plant)
+    }
+
+
+def lock_inactive(
+    plant: MultibodyPlant,
+    context: Context,
+    active: Sequence[str],
+    posture: Mapping[str, float] | None = None,
+) -> None:
+    """Locks all joints but `active`, each at its angle in `posture`.
+
+    Joints that `posture` does not name are locked where they stand. Entries
+    for active joints set these joints' angles, too.
+
+    Raises:
+        InputError: for an unknown joint or an angle beyond its limits.
+    """
+    for name in active:
+        get_joint(plant, name)
+    set_posture(plant, context, posture or {})
+    for name in joint_names(plant):
+        joint = get_joint(plant, name)
+        if name in active:
+            joint.Unlock(context)
+        else:
+            joint.Lock(context)
+
+
+@dataclasses.dataclass(frozen=True)
+class JointSelection:
+    """Where the active joints stand in the robot's state and actuation.
+
+    Attributes:
+        names: the active joints, in the order of every n-vector.
+        positions: (n,) indices into the robot's q (model instance).
+        velocities: (n,) indices into the robot's v (model instance).
+        actuators: (n,) indices into the robot's actuation input.
+        state_matrix: (2n, nq+nv), [q; q̇] of the active joints from the
+            robot's state.
+        actuation_matrix: (nu, n), the robot's actuation from the active
+            joints' torques.
+    """
+
+    names: tuple[str, ...]
+    positions: np.ndarray
+    velocities: np.ndarray
+    actuators: np.ndarray
+    state_matrix: np.ndarray
+    actuation_matrix: np.ndarray
+
+
+def select_joints(
+    plant: MultibodyPlant, names: Sequence[str]
+) -> JointSelection:
+    """Selects the joints `names` of the finalized `plant`.
+
+    Raises:
+        InputError: for an unknown joint or one named twice.
+    """
+    require(
+        len(names) > 0 and len(set(names)) == len(names),
+        "active joints",
+        list(names),
+        "at least one joint, none of them twice",
+    )
+    robot = plant.GetModelInstanceByName("affetto")
+    joints = [get_joint(plant, name) for name in names]
+    # The instance's own order, found by asking for the numbers 0, 1, 2, ...
+    q_order = plant.GetPositionsFromArray(
+        robot, np.arange(plant.num_positions(), dtype=float)
+    ).astype(int)
+    v_order = plant.GetVelocitiesFromArray(
+        robot, np.arange(plant.num_velocities(), dtype=float)
+    ).astype(int)
+    positions = np.array(
+        [int(np.flatnonzero(q_order == j.position_start())[0]) for j in joints]
+    )
+    velocities = np.array(
+        [int(np.flatnonzero(v_order == j.velocity_start())[0]) for j in joints]
+    )
+    order = [int(i) for i in plant.GetJointActuatorIndices(robot)]
+    actuators = np.array(
+        [
+            order.index(int(plant.GetJointActuatorByName(name, robot).index()))
+            for name in names
+        ]
+    )
+    n, nq, nv = len(names), len(q_order), len(v_order)
+    state_matrix = np.zeros((2 * n, nq + nv))
+    state_matrix[np.arange(n), positions] = 1.0
+    state_matrix[n + np.arange(n), nq + velocities] = 1.0
+    actuation_matrix = np.zeros((len(order), n))
+    actuation_matrix[actuators, np.arange(n)] = 1.0
+    return JointSelection(
+        names=tuple(names),
+        positions=positions,
+        velocities=velocities,
+        actuators=actuators,
+        state_matrix=state_matrix,
+        actuation_matrix=actuation_matrix,
+    )
+
+
+def _inspector(plant: MultibodyPlant, context: Context) -> SceneGraphInspector:
+    query = plant.get_geometry_query_input_port().Eval(context)
+    return query.inspector()
+
+
+def _collision_shapes(
+    plant: MultibodyPlant, context: Context, body: RigidBody, kind: type
+) -> list[tuple[RigidTransform, object]]:
+    inspector = _inspector(plant, context)
+    frame = plant.GetBodyFrameIdOrThrow(body.index())
+    return [
+        (inspector.GetPoseInFrame(i), inspector.GetShape(i))
+        for i in inspector.GetGeometries(frame, Role.kProximity)
+        if isinstance(inspector.GetShape(i), kind)
+    ]
+
+
+def table_extents(
+    plant: MultibodyPlant, context: Context
+) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corner [m] of the table top's box, each (3,), in world.
+
+    The plant must be connected to its SceneGraph. The table is level and
+    square to the world.
+    """
+    body = plant.GetBodyByName("table_top")
+    X_TG, box = _collision_shapes(plant, context, body, Box)[0]
+    X_WG = plant.EvalBodyPoseInWorld(context, body) @ X_TG
+    half = 0.5 * np.abs(X_WG.rotation().matrix()) @ box.size()
+    return X_WG.translation() - half, X_WG.translation() + half
+
+
+def drum_radius(plant: MultibodyPlant, context: Context) -> float:
+    """Radius [m] of the drum's shell, its widest part."""
+    body = plant.GetBodyByName("shell")
+    shapes = _collision_shapes(plant, context, body, Cylinder)
+    return max(shape.radius() for _, shape in shapes)
+
+
+def set_drum_position(
+    plant: MultibodyPlant, context: Context, xy: Sequence[float]
+) -> None:
+    """Puts the drum on the table at world x, y [m].
+
+    Raises:
+        InputError: if the drum would not stand wholly on the table.
+    """
+    xy = np.asarray(xy, dtype=float)
+    require(
+        xy.shape == (2,) and bool(np.all(np.isfinite(xy))),
+        "drum position",
+        xy.tolist(),
+        "two finite numbers (x and y in metres)",
+    )
+    lower, upper = table_extents(plant, context)
+    radius = drum_radius(plant, context)
+    low, high = lower[:2] + radius, upper[:2] - radius
+    require(
+        bool(np.all(xy >= low) and np.all(xy <= high)),
+        "drum position",
+        xy.tolist(),
+        f"x from {low[0]:.3f} to {high[0]:.3f} and y from {low[1]:.3f} to "
+        f"{high[1]:.3f} m (the drum stands wholly on the table)",
+    )
+    frame = plant.GetFrameByName(_PLACEMENT)
+    frame.SetPoseInParentFrame(context, RigidTransform([*xy, upper[2]]))
+
+
+def get_drum_position(plant: MultibodyPlant, context: Context) -> np.ndarray:
+    """The drum's world x, y [m], (2,)."""
+    frame = plant.GetFrameByName(_PLACEMENT)
+    return frame.GetPoseInParentFrame(context).translation()[:2].copy()
+
+
+def marker_position(plant: MultibodyPlant, context: Context) -> np.ndarray:
+    """World position [m] of the centre of the drum's marker, (3,)."""
+    frame = plant.GetFrameByName("marker")
+    return frame.CalcPoseInWorld(context).translation()
+
+
+def head_center_position(plant: MultibodyPlant, context: Context) -> np.ndarray:
+    """World position [m] of the top centre of the drum's head, (3,)."""
+    frame = plant.GetFrameByName("head_center")
+    return frame.CalcPoseInWorld(context).translation()
