@@ -1,0 +1,228 @@
+"""What the drum feels: contact forces that will become its sound."""
+
+from collections.abc import Sequence
+import math
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import ContactResults, MultibodyPlant
+from pydrake.multibody.tree import BodyIndex
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiagramBuilder,
+    InputPort,
+    LeafSystem,
+    OutputPort,
+)
+
+from drake_affetto.errors import require
+
+
+class DrumMicrophone(LeafSystem):
+    """Picks the contacts on drum and table out of a plant's contact results.
+
+    It hears nothing itself: its outputs are the forces that excite the drum,
+    sampled at the plant's step, from which
+    `drake_affetto.sound.voice.DrumVoice` makes the recording.
+
+    .. pydrake_system::
+
+        name: DrumMicrophone
+        input_ports:
+        - contact_results
+        - body_poses
+        output_ports:
+        - contact_force
+        - knock_force
+
+    Input ports:
+
+    - `contact_results`: abstract `ContactResults` of the plant (point
+      contact; hydroelastic surfaces are not listened to).
+    - `body_poses`: abstract `list[RigidTransform]`, the plant's port of the
+      same name; read only while something touches the head.
+
+    Output ports:
+
+    - `contact_force` (2): force on the head along its inward normal [N],
+      never negative, and distance of that force's centre from the centre of
+      the head [m]. Both zero without contact.
+    - `knock_force` (2): sum of the magnitudes of the contact forces on the
+      shell [N] and on the table [N].
+
+    There is no state. With the plant's default of sampled output ports the
+    forces are those of the plant's last step.
+    """
+
+    def __init__(
+        self,
+        *,
+        head: BodyIndex,
+        shell: Sequence[BodyIndex] = (),
+        table: Sequence[BodyIndex] = (),
+        X_BH: RigidTransform | None = None,
+    ):
+        """Listens to these bodies of one plant.
+
+        Args:
+            head: the body whose collision geometry is the drum's head.
+            shell: bodies that count as the drum's shell or rim.
+            table: bodies that count as the table.
+            X_BH: pose of the head's frame H in the body `head`; Ho is the
+                centre of the membrane and Hz points out of the drum.
+
+        Raises:
+            InputError: if one body is given two parts.
+        """
+        LeafSystem.__init__(self)
+        shell_indices = frozenset(int(body) for body in shell)
+        table_indices = frozenset(int(body) for body in table)
+        self._head = int(head)
+        for field, values, others in (
+            ("shell", shell_indices, {self._head}),
+            ("table", table_indices, {self._head} | shell_indices),
+        ):
+            require(
+                values.isdisjoint(others),
+                field,
+                sorted(values),
+                "bodies that have no other part in the sound",
+            )
+        self._shell = shell_indices
+        self._table = table_indices
+        self._X_BH = RigidTransform() if X_BH is None else X_BH
+        self._contact_results_port: InputPort = self.DeclareAbstractInputPort(
+            "contact_results", Value(ContactResults())
+        )
+        self._body_poses_port: InputPort = self.DeclareAbstractInputPort(
+            "body_poses", Value([RigidTransform()])
+        )
+        contacts = self.input_port_ticket(
+            self._contact_results_port.get_index()
+        )
+        poses = self.input_port_ticket(self._body_poses_port.get_index())
+        self._contact_force_port: OutputPort = self.DeclareVectorOutputPort(
+            "contact_force", 2, self._calc_contact_force, {contacts, poses}
+        )
+        self._knock_force_port: OutputPort = self.DeclareVectorOutputPort(
+            "knock_force", 2, self._calc_knock_force, {contacts}
+        )
+
+    @staticmethod
+    def AddToBuilder(
+        *,
+        builder: DiagramBuilder,
+        plant: MultibodyPlant,
+        drum_model: str = "drum",
+        table_model: str = "table",
+    ) -> "DrumMicrophone":
+        """Adds a microphone at the drum of `plant` and wires its inputs.
+
+        The drum model has the links `shell` and `head` and a frame
+        `head_center` on the head; every link of the table model is table.
+        """
+        drum = plant.GetModelInstanceByName(drum_model)
+        head = plant.GetBodyByName("head", drum)
+        head_center = plant.GetFrameByName("head_center", drum)
+        require(
+            head_center.body().index() == head.index(),
+            "head_center",
+            head_center.body().name(),
+            "a frame on the link 'head'",
+        )
+        table: Sequence[BodyIndex] = ()
+        if plant.HasModelInstanceNamed(table_model):
+            table = plant.GetBodyIndices(
+                plant.GetModelInstanceByName(table_model)
+            )
+        microphone = builder.AddSystem(
+            DrumMicrophone(
+                head=head.index(),
+                shell=[
+                    index
+                    for index in plant.GetBodyIndices(drum)
+                    if index != head.index()
+                ],
+                table=table,
+                X_BH=head_center.GetFixedPoseInBodyFrame(),
+            )
+        )
+        microphone.set_name("drum_microphone")
+        builder.Connect(
+            plant.get_contact_results_output_port(),
+            microphone.get_contact_results_input_port(),
+        )
+        builder.Connect(
+            plant.get_body_poses_output_port(),
+            microphone.get_body_poses_input_port(),
+        )
+        return microphone
+
+    def get_contact_results_input_port(self) -> InputPort:
+        """The plant's contact results."""
+        return self._contact_results_port
+
+    def get_body_poses_input_port(self) -> InputPort:
+        """The plant's body poses."""
+        return self._body_poses_port
+
+    def get_contact_force_output_port(self) -> OutputPort:
+        """Normal force on the head [N] and its distance from the centre [m]."""
+        return self._contact_force_port
+
+    def get_knock_force_output_port(self) -> OutputPort:
+        """Force on the shell and force on the table [N]."""
+        return self._knock_force_port
+
+    def _calc_contact_force(self, context: Context, output: BasicVector):
+        result = output.get_mutable_value()
+        result[:] = 0.0
+        contacts = self._contact_results_port.Eval(context)
+        count = contacts.num_point_pair_contacts()
+        if not count:
+            return
+        head = self._head
+        pushes = []
+        for i in range(count):
+            info = contacts.point_pair_contact_info(i)
+            if int(info.bodyB_index()) == head:
+                pushes.append((info.contact_force(), info.contact_point()))
+            elif int(info.bodyA_index()) == head:
+                pushes.append((-info.contact_force(), info.contact_point()))
+        if not pushes:
+            return
+        X_WB = self._body_poses_port.Eval(context)[head]
+        X_WH = X_WB.multiply(self._X_BH)
+        p_WH = X_WH.translation()
+        R_WH = X_WH.rotation().matrix()
+        total = x = y = 0.0
+        for f_W, p_WC in pushes:
+            # Friction along the head, and what pushes its edge sideways, do
+            # not move the membrane.
+            push = -float(f_W @ R_WH[:, 2])
+            if push <= 0.0:
+                continue
+            p_H = R_WH.T @ (p_WC - p_WH)
+            total += push
+            x += push * p_H[0]
+            y += push * p_H[1]
+        if total > 0.0:
+            result[0] = total
+            result[1] = math.hypot(x, y) / total
+
+    def _calc_knock_force(self, context: Context, output: BasicVector):
+        result = output.get_mutable_value()
+        result[:] = 0.0
+        contacts = self._contact_results_port.Eval(context)
+        for i in range(contacts.num_point_pair_contacts()):
+            info = contacts.point_pair_contact_info(i)
+            pair = {int(info.bodyA_index()), int(info.bodyB_index())}
+            # The shell's own contact with the table is not a knock.
+            on_shell = not pair.isdisjoint(self._shell)
+            on_table = not pair.isdisjoint(self._table)
+            if on_shell != on_table and self._head not in pair:
+                result[0 if on_shell else 1] += float(
+                    np.linalg.norm(info.contact_force())
+                )
