@@ -1,0 +1,133 @@
+"""The system that finds the marker in the camera's image."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiagramBuilder,
+    InputPort,
+    LeafSystem,
+    OutputPort,
+    ValueProducer,
+)
+from pydrake.systems.sensors import ImageRgba8U
+
+from drake_affetto.perception.blob import BlobCalibration, BlobConfig, detect
+
+# What x_img and y_img are when there is no marker. `found` tells.
+LOST = 0.5
+
+
+class BlobSensor(LeafSystem):
+    """Finds the marker in an image.
+
+    .. pydrake_system::
+
+        name: BlobSensor
+        input_ports:
+        - color_image
+        output_ports:
+        - blob
+        - blob_pixels
+
+    - color_image: ImageRgba8U.
+    - blob (3): x_img, y_img, found. The first two run from 0 to 1 over the
+      calibrated box, y downwards, and beyond outside of it. found is 1, or 0
+      where no marker is seen; x_img and y_img are then 0.5 and mean nothing.
+    - blob_pixels (4): u, v [pixels], area [pixels²], confidence in [0, 1]; all
+      0 where no marker is seen.
+
+    Nothing is kept from one image to the next, and no image is asked for
+    (so that none is rendered) until an output is evaluated. The calibration
+    is a numeric parameter (`set_calibration`).
+    """
+
+    def __init__(self, config: BlobConfig | None = None) -> None:
+        super().__init__()
+        self._config = config or BlobConfig()
+        self._config.check("blob")
+        calibration = self.DeclareNumericParameter(
+            BasicVector(self._config.calibration.to_vector())
+        )
+        self._calibration_index = int(calibration)
+        self._image_port = self.DeclareAbstractInputPort(
+            "color_image", Value(ImageRgba8U())
+        )
+        image = self.input_port_ticket(self._image_port.get_index())
+        self._pixels_cache = self.DeclareCacheEntry(
+            description="blob in pixels",
+            value_producer=ValueProducer(
+                allocate=Value(np.zeros(4)).Clone, calc=self._calc_detection
+            ),
+            prerequisites_of_calc={image},
+        )
+        prerequisites = {image, self.all_parameters_ticket()}
+        self._blob_port = self.DeclareVectorOutputPort(
+            "blob", 3, self._calc_blob, prerequisites
+        )
+        self._pixels_port = self.DeclareVectorOutputPort(
+            "blob_pixels", 4, self._calc_pixels, {image}
+        )
+
+    @staticmethod
+    def AddToBuilder(
+        *,
+        builder: DiagramBuilder,
+        color_image: OutputPort,
+        config: BlobConfig | None = None,
+    ) -> "BlobSensor":
+        """Adds a sensor that looks at `color_image`."""
+        sensor = builder.AddNamedSystem("blob_sensor", BlobSensor(config))
+        builder.Connect(color_image, sensor.get_color_image_input_port())
+        return sensor
+
+    def get_color_image_input_port(self) -> InputPort:
+        return self._image_port
+
+    def get_blob_output_port(self) -> OutputPort:
+        return self._blob_port
+
+    def get_blob_pixels_output_port(self) -> OutputPort:
+        return self._pixels_port
+
+    @property
+    def config(self) -> BlobConfig:
+        """The settings given at construction."""
+        return self._config
+
+    def calibration(self, context: Context) -> BlobCalibration:
+        """The calibration in this context."""
+        box = context.get_numeric_parameter(self._calibration_index)
+        return BlobCalibration(*(float(v) for v in box.CopyToVector()))
+
+    def set_calibration(
+        self, context: Context, calibration: BlobCalibration
+    ) -> None:
+        """Sets the box of pixels that is mapped to [0, 1]."""
+        calibration.check("calibration")
+        context.get_mutable_numeric_parameter(
+            self._calibration_index
+        ).SetFromVector(calibration.to_vector())
+
+    def _calc_detection(self, context: Context, cache: Any) -> None:
+        blob = detect(self._image_port.Eval(context).data, self._config)
+        cache.set_value(
+            np.zeros(4)
+            if blob is None
+            else np.array(dataclasses.astuple(blob), dtype=float)
+        )
+
+    def _calc_blob(self, context: Context, output: BasicVector) -> None:
+        pixels = self._pixels_cache.Eval(context)
+        if pixels[2] <= 0.0:
+            output.SetFromVector([LOST, LOST, 0.0])
+            return
+        x, y = self.calibration(context).normalise(pixels[:2])
+        output.SetFromVector([x, y, 1.0])
+
+    def _calc_pixels(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._pixels_cache.Eval(context))
