@@ -1,0 +1,224 @@
+"""Draws a Diagram: systems as tables of ports, connections as arrows.
+
+Drake describes a Diagram in Graphviz's language; here the description is made
+readable (no ports that nothing is connected to, a colour for each stage) and
+rendered by the Graphviz library that pygraphviz brings along, so that no `dot`
+program is needed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import html
+from pathlib import Path
+import re
+from typing import TYPE_CHECKING
+
+from drake_affetto.errors import InputError, require
+from drake_affetto.output import (
+    prepare_output,
+    write_bytes_atomic,
+    write_text_atomic,
+)
+
+if TYPE_CHECKING:
+    from pydrake.systems.framework import System
+
+SOURCE_SUFFIXES = (".dot", ".gv")
+IMAGE_SUFFIXES = (".svg", ".png", ".pdf")
+
+# The stages of the signal's way round, in pale colours that print.
+STAGE_COLORS = {
+    "scene": "#e6e6e6",
+    "perception": "#cfe3f7",
+    "skill": "#dcd3f2",
+    "motion": "#f7d4e3",
+    "control": "#fbdcc4",
+    "pneumatics": "#fbeeb8",
+    "sound": "#d3efd0",
+    "teaching": "#cdeeea",
+}
+
+_STYLE = """rankdir=LR
+graph [fontname="Helvetica", fontsize=12, ranksep=0.9, nodesep=0.3]
+node [fontname="Helvetica", fontsize=11]
+edge [color="#444444", arrowsize=0.7]"""
+
+_NODE = re.compile(
+    r"^(?P<id>s\d+) \[shape=none, border=0, label=<\n"
+    r"(?P<table><TABLE.*?</TABLE>)\n>\];$",
+    re.DOTALL | re.MULTILINE,
+)
+_HEADER = re.compile(
+    r"<TR><TD (?P<attributes>[^>]*)>\s*(?P<text><B>.*?)</TD></TR>", re.DOTALL
+)
+_NAME = re.compile(r"^name=(.*)$", re.MULTILINE)
+_PORT = re.compile(r'<TD PORT="(?P<id>[uy]\d+)"[^>]*>(?P<text>.*?)</TD>')
+_EDGE = re.compile(r"^(\w+):(\w+):e -> (\w+):(\w+):w", re.MULTILINE)
+
+
+def graphviz_source(
+    system: System, *, max_depth: int = 1, all_ports: bool = False
+) -> str:
+    """The Graphviz description of `system`, made readable.
+
+    Args:
+        max_depth: how deep nested Diagrams are opened; at 0 the whole is one
+            block.
+        all_ports: whether to keep the ports that nothing is connected to.
+
+    Raises:
+        InputError: for a negative `max_depth`.
+    """
+    require(max_depth >= 0, "max_depth", max_depth, "0 or more")
+    source = system.GetGraphvizString(max_depth)
+    connected = set()
+    for start, output, end, input_ in _EDGE.findall(source):
+        connected |= {(start, output), (end, input_)}
+    colors = _stage_colors(system)
+    # A block that stands alone has no connections and is its ports.
+    keep_all = all_ports or not connected
+
+    def redraw(match: re.Match[str]) -> str:
+        node, table = match["id"], match["table"]
+        header = _HEADER.search(table)
+        if header is None:
+            return match[0]
+        name = _NAME.search(header["text"])
+        color = colors.get(html.unescape(name[1]) if name else "", "white")
+        ports = [
+            (port["id"], port["text"])
+            for port in _PORT.finditer(table)
+            if keep_all or (node, port["id"]) in connected
+        ]
+        inputs = [port for port in ports if port[0].startswith("u")]
+        outputs = [port for port in ports if port[0].startswith("y")]
+        return (
+            f"{node} [shape=none, border=0, label=<\n"
+            '<TABLE BORDER="0" CELLSPACING="0" CELLPADDING="4">\n'
+            f'<TR><TD BORDER="1" COLSPAN="2" BGCOLOR="{color}">\n'
+            f"{header['text']}</TD></TR>\n{_rows(inputs, outputs)}"
+            "</TABLE>\n>];"
+        )
+
+    return _NODE.sub(redraw, source).replace("rankdir=LR", _STYLE, 1)
+
+
+def write_diagram(
+    system: System,
+    path: str | Path,
+    max_depth: int = 1,
+    *,
+    all_ports: bool = False,
+) -> Path:
+    """Draws `system` into the file `path`, as its suffix says.
+
+    Args:
+        path: .svg, .png or .pdf for a picture; .dot or .gv for its source.
+        max_depth: how deep nested Diagrams are opened.
+        all_ports: whether to keep the ports that nothing is connected to.
+
+    Returns:
+        The file written.
+
+    Raises:
+        InputError: for another suffix, a negative depth, or a file that cannot
+            be written.
+    """
+    path = _check_suffix(path)
+    source = graphviz_source(system, max_depth=max_depth, all_ports=all_ports)
+    if path.suffix.lower() in SOURCE_SUFFIXES:
+        write_text_atomic(path, source)
+        return path
+    import pygraphviz
+
+    graph = pygraphviz.AGraph(string=source)
+    graph.layout(prog="dot")
+    write_bytes_atomic(path, graph.draw(format=path.suffix.lower()[1:]))
+    return path
+
+
+def _check_suffix(path: str | Path) -> Path:
+    path = Path(path).expanduser()
+    known = IMAGE_SUFFIXES + SOURCE_SUFFIXES
+    if path.suffix.lower() not in known:
+        raise InputError(f"{path} should end in one of {', '.join(known)}")
+    return path
+
+
+def _stage_colors(system: System) -> dict[str, str]:
+    """The colour of each subsystem that belongs to a stage, by its name."""
+    colors = {}
+    for subsystem in getattr(system, "GetSystems", list)():
+        package, _, rest = type(subsystem).__module__.partition(".")
+        stage = rest.partition(".")[0]
+        if package == "drake_affetto" and stage in STAGE_COLORS:
+            colors[subsystem.get_name()] = STAGE_COLORS[stage]
+        colors |= _stage_colors(subsystem)
+    return colors
+
+
+def _rows(inputs: list[tuple[str, str]], outputs: list[tuple[str, str]]) -> str:
+    """The table's rows: inputs at the left, outputs at the right.
+
+    The shorter side's last port takes the rows that are left over.
+    """
+    count = max(len(inputs), len(outputs))
+
+    def cell(ports: list[tuple[str, str]], row: int) -> str:
+        if row < len(ports):
+            port, text = ports[row]
+            span = count - row if row == len(ports) - 1 else 1
+            return f'<TD PORT="{port}" BORDER="1" ROWSPAN="{span}">{text}</TD>'
+        if row == 0:
+            return f'<TD BORDER="1" ROWSPAN="{count}"> </TD>'
+        return ""
+
+    return "".join(
+        f"<TR>{cell(inputs, row)}{cell(outputs, row)}</TR>\n"
+        for row in range(count)
+    )
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `affetto diagram`."""
+    parser.add_argument(
+        "--scenario",
+        metavar="NAME",
+        default="drumming",
+        help="a scenario's name, or its YAML file",
+    )
+    parser.add_argument(
+        "--out",
+        metavar="FILE",
+        type=Path,
+        default=Path("out/diagram.svg"),
+        help="the picture (.svg, .png, .pdf) or its source (.dot, .gv)",
+    )
+    parser.add_argument(
+        "--depth",
+        metavar="N",
+        type=int,
+        default=1,
+        help="how deep nested Diagrams are opened",
+    )
+    parser.add_argument(
+        "--all-ports",
+        action="store_true",
+        help="also draw the ports that nothing is connected to",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Builds the scenario's station and draws it."""
+    path = _check_suffix(args.out)
+    require(args.depth >= 0, "--depth", args.depth, "0 or more")
+    from drake_affetto.scenario import load_scenario
+    from drake_affetto.station import AffettoStation
+
+    scenario = load_scenario(args.scenario)
+    prepare_output(path.parent)
+    station = AffettoStation(scenario)
+    write_diagram(station, path, args.depth, all_ports=args.all_ports)
+    print(path)
+    return 0

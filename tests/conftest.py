@@ -1,0 +1,17 @@
+"""What holds for all tests, before anything heavy is imported."""
+
+import os
+
+# One thread a process, no display, and what Drake will drop is an error.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("MPLBACKEND", "Agg")
+os.environ.setdefault("DRAKE_DEPRECATION_RUNTIME_SEVERITY", "error")
+
+import hypothesis
+
+# The same examples in every run, and none fails for a slow machine.
+hypothesis.settings.register_profile(
+    "project", deadline=None, derandomize=True, database=None
+)
+hypothesis.settings.load_profile("project")
