@@ -1,0 +1,462 @@
+"""Turning the upper body until the marker is centred, as a state machine.
+
+The servo looks at a new image at the camera's rate. From the joint's angle q
+at the time of exposure and the marker's distance from the image's middle it
+takes the yaw at which the marker would be centred,
+
+    q* = q - atan(e / f) / k,
+
+e being the distance [pixels], f the focal length and k how much the image
+turns per turn of the joint. It commands that yaw, plus an integral of what
+the joint stays behind (a pneumatic joint with friction stops a degree short).
+Because q* belongs to one image, neither the actuator's lag nor the camera's
+latency makes it wind up.
+
+All state is one array of floats, so that it fits a discrete state vector;
+`Gaze` holds settings only.
+"""
+
+import dataclasses
+import enum
+import math
+
+import numpy as np
+
+from drake_affetto.errors import require, require_range
+
+Array = np.ndarray
+
+
+class GazeMode(enum.IntEnum):
+    """What the servo is to do."""
+
+    CENTRE = 0
+    FIXED_YAW = 1
+
+
+class GazePhase(enum.IntEnum):
+    """Where the servo stands."""
+
+    START = 0
+    TRACK = 1
+    SEARCH = 2
+    SETTLED = 3
+    FAILED = 4
+
+
+@dataclasses.dataclass
+class GazeConfig:
+    """Settings of the gaze servo.
+
+    Lengths in the image are fractions of its width; speeds per second.
+
+    Attributes:
+        gain: part of the way to q* that is commanded per image.
+        integral_gain: growth [rad/s per rad] of the command while the joint
+            stays behind q*.
+        integral_limit: greatest offset [rad] of the integral.
+        image_gain: k, image angle per joint angle. More than 1 if the camera
+            stands before the axis of the joint, and less if it looks down.
+        max_speed: slew limit [rad/s] of the yaw command.
+        search_speed: speed [rad/s] of the search sweep.
+        yaw_min: lower end [rad] of the search and of any command.
+        yaw_max: upper end [rad] of the search and of any command.
+        tolerance: greatest distance of the marker from the middle.
+        still: greatest speed of the marker in a still image [1/s].
+        settled_frames: images in a row that must be still and centred; τ is
+            their mean.
+        near_yaw: at a fixed yaw, how near [rad] the joint must be to it when
+            τ is taken.
+        lost_frames: images in a row without marker that start the search (or
+            the failure, at a fixed yaw).
+        timeout: time [s] after which the trial fails.
+        keep_yaw: whether the yaw stays where it is once settled, instead of
+            going back to the start posture.
+    """
+
+    gain: float = 1.0
+    integral_gain: float = 1.2
+    integral_limit: float = 0.15
+    image_gain: float = 1.0
+    max_speed: float = 0.8
+    search_speed: float = 0.5
+    yaw_min: float = -0.5
+    yaw_max: float = 0.5
+    tolerance: float = 0.01
+    still: float = 0.06
+    settled_frames: int = 4
+    near_yaw: float = 0.012
+    lost_frames: int = 3
+    timeout: float = 8.0
+    keep_yaw: bool = False
+
+    def check(self, where: str) -> None:
+        """Raises InputError if a value is out of range."""
+        ranges = {
+            "gain": (0.05, 2.0),
+            "integral_gain": (0.0, 20.0),
+            "integral_limit": (0.0, 1.0),
+            "image_gain": (0.1, 5.0),
+            "max_speed": (0.01, 20.0),
+            "search_speed": (0.01, 20.0),
+            "yaw_min": (-math.pi, math.pi),
+            "yaw_max": (-math.pi, math.pi),
+            "tolerance": (1e-4, 0.5),
+            "still": (1e-4, 10.0),
+            "settled_frames": (1, 50),
+            "near_yaw": (1e-3, 1.0),
+            "lost_frames": (1, 100),
+            "timeout": (0.5, 600.0),
+        }
+        for name, (low, high) in ranges.items():
+            require_range(f"{where}.{name}", getattr(self, name), low, high)
+        require(
+            self.yaw_min < self.yaw_max,
+            f"{where}.yaw_max",
+            self.yaw_max,
+            f"more than yaw_min ({self.yaw_min:g})",
+        )
+
+
+@dataclasses.dataclass
+class GazeView:
+    """How x_img, y_img lie in the image, for the servo.
+
+    Attributes:
+        center_x: x_img of the middle of the image.
+        width: the image's width in units of x_img.
+        height_per_width: unit of y_img over unit of x_img, in pixels.
+        focal: focal length in units of x_img.
+    """
+
+    center_x: float = 0.5
+    width: float = 1.0
+    height_per_width: float = 0.75
+    focal: float = 0.8
+
+    def check(self, where: str) -> None:
+        """Raises InputError if a value is out of range."""
+        require_range(f"{where}.center_x", self.center_x, -100, 100)
+        require_range(f"{where}.width", self.width, 1e-3, 1e3)
+        require_range(
+            f"{where}.height_per_width", self.height_per_width, 1e-3, 1e3
+        )
+        require_range(f"{where}.focal", self.focal, 1e-3, 1e4)
+
+
+@dataclasses.dataclass
+class GazeTask:
+    """What one trial asks of the servo; parameters in a context.
+
+    Attributes:
+        enabled: whether to look at all.
+        mode: centre the marker, or look from a fixed yaw.
+        fixed_yaw: that yaw [rad].
+        start_yaw: yaw [rad] of the start posture.
+    """
+
+    enabled: bool = True
+    mode: GazeMode = GazeMode.CENTRE
+    fixed_yaw: float = 0.0
+    start_yaw: float = 0.0
+
+    def to_vector(self) -> Array:
+        """The task as an array (4,)."""
+        return np.array(
+            [
+                float(self.enabled),
+                float(self.mode),
+                self.fixed_yaw,
+                self.start_yaw,
+            ]
+        )
+
+    @classmethod
+    def from_vector(cls, vector: Array) -> "GazeTask":
+        """The inverse of `to_vector`."""
+        return cls(
+            bool(vector[0] > 0.5),
+            GazeMode(round(float(vector[1]))),
+            float(vector[2]),
+            float(vector[3]),
+        )
+
+
+# Layout of the state.
+PHASE = 0
+T_BEGIN = 1  # time of the first image
+T_RAMP = 2  # the command ramps from YAW_RAMP at T_RAMP …
+YAW_RAMP = 3
+YAW_GOAL = 4  # … to YAW_GOAL …
+SPEED = 5  # … at this speed
+OFFSET = 6  # the integral
+T_LAST = 7  # time of the latest image with a marker
+X_LAST = 8  # and where the marker was
+Y_LAST = 9
+Q_LAST = 10
+IMAGE_GAIN = 11  # k, as corrected on the way
+MISSED = 12  # images in a row without marker
+SWEEP = 13  # leg of the search
+COUNT = 14  # still and centred images in a row …
+SUM_1 = 15  # … and the sums of their τ
+SUM_2 = 16
+TAU_1 = 17
+TAU_2 = 18
+SIZE = 19
+
+
+class Gaze:
+    """The gaze servo without ports.
+
+    Args:
+        config: settings.
+        view: how the blob's coordinates lie in the image.
+    """
+
+    def __init__(self, config: GazeConfig, view: GazeView) -> None:
+        config.check("gaze")
+        view.check("gaze view")
+        self.config = config
+        self.view = view
+
+    def initial_state(self) -> Array:
+        """The state (SIZE,) before the first image."""
+        x = np.zeros(SIZE)
+        x[IMAGE_GAIN] = self.config.image_gain
+        return x
+
+    def wants_image(self, x: Array, task: GazeTask) -> bool:
+        """Whether a further image is of any use."""
+        return task.enabled and x[PHASE] not in (
+            GazePhase.SETTLED,
+            GazePhase.FAILED,
+        )
+
+    def yaw_command(self, x: Array, t: float, task: GazeTask) -> float:
+        """The commanded yaw [rad] at time t: a ramp without jumps."""
+        if not task.enabled or x[PHASE] == GazePhase.START:
+            return task.start_yaw
+        reach = x[SPEED] * max(t - x[T_RAMP], 0.0)
+        way = x[YAW_GOAL] - x[YAW_RAMP]
+        return float(x[YAW_RAMP] + min(max(way, -reach), reach))
+
+    def is_settled(self, x: Array, task: GazeTask) -> bool:
+        """Whether τ is known."""
+        return task.enabled and x[PHASE] == GazePhase.SETTLED
+
+    def is_failed(self, x: Array, task: GazeTask) -> bool:
+        """Whether the trial is given up."""
+        return task.enabled and x[PHASE] == GazePhase.FAILED
+
+    def is_ready(self, x: Array, t: float, task: GazeTask) -> bool:
+        """Whether τ is known and the yaw command has come to rest."""
+        return self.is_settled(x, task) and (
+            abs(self.yaw_command(x, t, task) - x[YAW_GOAL]) < 1e-6
+        )
+
+    def update(
+        self,
+        x: Array,
+        t: float,
+        blob: Array,
+        q: float,
+        t_image: float,
+        task: GazeTask,
+    ) -> None:
+        """Takes in one image; changes the state `x` in place.
+
+        Args:
+            x: state (SIZE,).
+            t: time [s].
+            blob: x_img, y_img, found (3,) of the image.
+            q: the joint's angle [rad] when the image was exposed.
+            t_image: time [s] of the exposure.
+            task: what the trial asks.
+        """
+        if not self.wants_image(x, task):
+            return
+        if x[PHASE] == GazePhase.START:
+            x[PHASE] = GazePhase.TRACK
+            x[T_BEGIN] = t_image
+            x[T_RAMP], x[YAW_RAMP] = t, task.start_yaw
+            x[YAW_GOAL], x[SPEED] = task.start_yaw, self.config.max_speed
+            x[T_LAST] = -np.inf
+        if task.mode == GazeMode.FIXED_YAW:
+            self._look_from_fixed_yaw(x, t, blob, q, t_image, task)
+        else:
+            self._centre(x, t, blob, q, t_image, task)
+        if (
+            x[PHASE] in (GazePhase.TRACK, GazePhase.SEARCH)
+            and t_image - x[T_BEGIN] > self.config.timeout
+        ):
+            self._give_up(x, t, task)
+
+    # Modes
+
+    def _look_from_fixed_yaw(
+        self,
+        x: Array,
+        t: float,
+        blob: Array,
+        q: float,
+        t_image: float,
+        task: GazeTask,
+    ) -> None:
+        config = self.config
+        behind = task.fixed_yaw - q
+        self._integrate(x, behind, t_image)
+        self._go_to(x, t, task, task.fixed_yaw + x[OFFSET], config.max_speed)
+        near = abs(behind) <= config.near_yaw
+        if not blob[2] > 0.5:
+            x[COUNT] = 0
+            arrived = abs(behind) <= 5.0 * config.near_yaw
+            x[MISSED] = x[MISSED] + 1 if arrived else 0
+            if x[MISSED] >= config.lost_frames + config.settled_frames:
+                self._give_up(x, t, task)
+            return
+        x[MISSED] = 0
+        still = self._is_still(x, blob, t_image)
+        self._remember(x, blob, q, t_image)
+        self._count(x, t, task, near and still, blob[0], blob[1])
+
+    def _centre(
+        self,
+        x: Array,
+        t: float,
+        blob: Array,
+        q: float,
+        t_image: float,
+        task: GazeTask,
+    ) -> None:
+        config = self.config
+        if not blob[2] > 0.5:
+            x[COUNT] = 0
+            x[MISSED] += 1
+            if x[PHASE] == GazePhase.TRACK:
+                if x[MISSED] >= config.lost_frames:
+                    self._begin_search(x, t, task)
+            elif x[PHASE] == GazePhase.SEARCH:
+                self._search(x, t, task, q)
+            return
+        if x[PHASE] == GazePhase.SEARCH:
+            x[PHASE] = GazePhase.TRACK
+            x[T_LAST] = -np.inf
+        x[MISSED] = 0
+        still = self._is_still(x, blob, t_image)
+        error = blob[0] - self.view.center_x
+        self._learn_image_gain(x, blob, q)
+        # Turning left (+) moves the marker right: too far right, turn right.
+        way = -math.atan(error / self.view.focal) / x[IMAGE_GAIN]
+        centred = abs(error) <= config.tolerance * self.view.width
+        centred_yaw = q + way
+        if still:
+            self._integrate(x, way, t_image)
+        self._remember(x, blob, q, t_image)
+        step = config.gain * way if not centred else way
+        self._go_to(x, t, task, q + step + x[OFFSET], config.max_speed)
+        self._count(x, t, task, centred and still, blob[1], centred_yaw)
+
+    # Steps
+
+    def _remember(self, x: Array, blob: Array, q: float, t: float) -> None:
+        x[T_LAST], x[X_LAST], x[Y_LAST], x[Q_LAST] = t, blob[0], blob[1], q
+
+    def _is_still(self, x: Array, blob: Array, t: float) -> bool:
+        """Whether the marker moved little since the image before."""
+        elapsed = t - x[T_LAST]
+        if not 0 < elapsed < 1.0:
+            return False
+        dx = blob[0] - x[X_LAST]
+        dy = (blob[1] - x[Y_LAST]) * self.view.height_per_width
+        speed = math.hypot(dx, dy) / elapsed / self.view.width
+        return speed <= self.config.still
+
+    def _learn_image_gain(self, x: Array, blob: Array, q: float) -> None:
+        """Corrects k by what a clear turn did to the image."""
+        turn = q - x[Q_LAST]
+        if not math.isfinite(x[T_LAST]) or abs(turn) < 0.02:
+            return
+        focal, center = self.view.focal, self.view.center_x
+        angle = math.atan((blob[0] - center) / focal)
+        before = math.atan((x[X_LAST] - center) / focal)
+        nominal = self.config.image_gain
+        seen = (angle - before) / turn
+        seen = min(max(seen, 0.4 * nominal), 2.5 * nominal)
+        x[IMAGE_GAIN] += 0.5 * (seen - x[IMAGE_GAIN])
+
+    def _integrate(self, x: Array, behind: float, t: float) -> None:
+        """Adds to the command what the joint stays behind, if for long."""
+        config = self.config
+        elapsed = t - x[T_LAST]
+        if not 0 < elapsed < 1.0 or abs(behind) > 0.15:
+            return
+        offset = x[OFFSET] + config.integral_gain * elapsed * behind
+        limit = config.integral_limit
+        x[OFFSET] = min(max(offset, -limit), limit)
+
+    def _go_to(
+        self, x: Array, t: float, task: GazeTask, yaw: float, speed: float
+    ) -> None:
+        x[YAW_RAMP] = self.yaw_command(x, t, task)
+        x[T_RAMP] = t
+        x[YAW_GOAL] = min(max(yaw, self.config.yaw_min), self.config.yaw_max)
+        x[SPEED] = speed
+
+    def _count(
+        self,
+        x: Array,
+        t: float,
+        task: GazeTask,
+        good: bool,
+        tau_1: float,
+        tau_2: float,
+    ) -> None:
+        """Counts a good image; settles once there are enough in a row."""
+        if not good:
+            x[COUNT] = x[SUM_1] = x[SUM_2] = 0.0
+            return
+        x[COUNT] += 1
+        x[SUM_1] += tau_1
+        x[SUM_2] += tau_2
+        if x[COUNT] >= self.config.settled_frames:
+            x[TAU_1] = x[SUM_1] / x[COUNT]
+            x[TAU_2] = x[SUM_2] / x[COUNT]
+            x[PHASE] = GazePhase.SETTLED
+            self._return(x, t, task)
+
+    def _return(self, x: Array, t: float, task: GazeTask) -> None:
+        if not self.config.keep_yaw:
+            self._go_to(x, t, task, task.start_yaw, self.config.max_speed)
+
+    def _give_up(self, x: Array, t: float, task: GazeTask) -> None:
+        x[PHASE] = GazePhase.FAILED
+        x[TAU_1] = x[TAU_2] = 0.0
+        self._return(x, t, task)
+
+    def _sweep(self, task: GazeTask) -> list[float]:
+        """The search: to the nearer end first, then to the other."""
+        config = self.config
+        ends = [config.yaw_min, config.yaw_max]
+        return sorted(ends, key=lambda end: abs(end - task.start_yaw))
+
+    def _begin_search(self, x: Array, t: float, task: GazeTask) -> None:
+        x[PHASE] = GazePhase.SEARCH
+        x[SWEEP] = 0
+        x[OFFSET] = 0.0
+        self._go_to(x, t, task, self._sweep(task)[0], self.config.search_speed)
+
+    def _search(self, x: Array, t: float, task: GazeTask, q: float) -> None:
+        if abs(self.yaw_command(x, t, task) - x[YAW_GOAL]) > 1e-9:
+            return
+        # The command has arrived; the joint and the image come later.
+        if abs(q - x[YAW_GOAL]) > self.config.near_yaw and (
+            t - x[T_RAMP]
+            < 0.8 + abs(x[YAW_GOAL] - x[YAW_RAMP]) / self.config.search_speed
+        ):
+            return
+        x[SWEEP] += 1
+        legs = self._sweep(task)
+        if x[SWEEP] >= len(legs):
+            self._give_up(x, t, task)
+            return
+        self._go_to(x, t, task, legs[int(x[SWEEP])], self.config.search_speed)

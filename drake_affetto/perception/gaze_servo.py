@@ -1,0 +1,330 @@
+"""The system that turns the upper body to the marker and takes τ."""
+
+import math
+
+import numpy as np
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiagramBuilder,
+    DiscreteValues,
+    InputPort,
+    LeafSystem,
+    OutputPort,
+)
+
+from drake_affetto.errors import require, require_range
+from drake_affetto.perception.blob import BlobCalibration
+from drake_affetto.perception.gaze import (
+    TAU_1,
+    TAU_2,
+    Gaze,
+    GazeConfig,
+    GazeMode,
+    GazeTask,
+    GazeView,
+)
+from drake_affetto.perception.optics import Camera
+
+
+def gaze_view(camera: Camera, calibration: BlobCalibration) -> GazeView:
+    """How the calibrated blob coordinates lie in a camera's image."""
+    unit_x = calibration.u_max - calibration.u_min
+    unit_y = calibration.v_max - calibration.v_min
+    center = calibration.normalise(camera.image_center)
+    return GazeView(
+        center_x=float(center[0]),
+        width=camera.width / unit_x,
+        height_per_width=unit_y / unit_x,
+        focal=camera.focal_x / unit_x,
+    )
+
+
+class GazeServo(LeafSystem):
+    """Turns the upper body's yaw until the marker is centred; gives τ.
+
+    .. pydrake_system::
+
+        name: GazeServo
+        input_ports:
+        - blob
+        - estimated_state
+        output_ports:
+        - yaw_command
+        - task_parameter
+        - settled
+        - failed
+        - ready
+
+    - blob (3): x_img, y_img, found.
+    - estimated_state (2n): [q; q̇] of the active joints [rad, rad/s].
+    - yaw_command (1): where the yaw joint should be [rad], without jumps.
+    - task_parameter (2): [y_img, q₃*] if the marker was centred, [x_img,
+      y_img] at a fixed yaw; zeros until settled is 1.
+    - settled (1): 1 once τ is known, else 0.
+    - failed (1): 1 once the marker is given up, else 0.
+    - ready (1): 1 once τ is known and the yaw command is back at the start
+      posture, else 0.
+
+    An image is taken in at the camera's rate, with the camera's latency:
+    `blob` and the yaw are read at the time of exposure and used later by the
+    latency. Once settled, failed or not enabled, `blob` is not evaluated, so
+    that no image is rendered. What a trial asks (`GazeTask`) is a numeric
+    parameter with its setters; the rest of the state is discrete.
+    """
+
+    def __init__(
+        self,
+        n: int,
+        yaw_index: int,
+        view: GazeView,
+        config: GazeConfig | None = None,
+        rate: float = 10.0,
+        latency: float = 0.0,
+    ) -> None:
+        """Fixes what does not change from trial to trial.
+
+        Args:
+            n: number of active joints.
+            yaw_index: which of them is the yaw of the upper body.
+            view: how the blob's coordinates lie in the image.
+            config: settings of the servo.
+            rate: images per second.
+            latency: time [s] from exposure until an image can be used.
+
+        Raises:
+            InputError: if a value is out of range.
+        """
+        super().__init__()
+        require(n >= 1, "n", n, "at least 1")
+        require(
+            0 <= yaw_index < n, "yaw_index", yaw_index, f"from 0 to {n - 1}"
+        )
+        require_range("rate", rate, 0.1, 1e4)
+        require_range("latency", latency, 0.0, 10.0)
+        self._gaze = Gaze(config or GazeConfig(), view)
+        self._yaw_index = yaw_index
+        self._period = 1.0 / rate
+        # Images on their way: exposed, not yet usable. The newest is last.
+        self._queue = max(1, math.ceil(latency * rate - 1e-9))
+        self._latency = latency
+
+        task = self.DeclareNumericParameter(BasicVector(GazeTask().to_vector()))
+        self._task_index = int(task)
+        self._blob_port = self.DeclareVectorInputPort("blob", 3)
+        self._state_port = self.DeclareVectorInputPort("estimated_state", 2 * n)
+        self._gaze_state = int(
+            self.DeclareDiscreteState(self._gaze.initial_state())
+        )
+        # Each image: time of exposure (-∞: none), x_img, y_img, found, yaw.
+        empty = np.zeros((self._queue, 5))
+        empty[:, 0] = -np.inf
+        self._images = int(self.DeclareDiscreteState(empty.ravel()))
+
+        delay = latency % self._period
+        if min(delay, self._period - delay) < 1e-6:
+            # Used at a later exposure (or at once): one event does both.
+            self.DeclarePeriodicDiscreteUpdateEvent(
+                self._period, 0.0, self._expose_and_use
+            )
+        else:
+            self.DeclarePeriodicDiscreteUpdateEvent(
+                self._period, 0.0, self._expose
+            )
+            self.DeclarePeriodicDiscreteUpdateEvent(
+                self._period, delay, self._use
+            )
+
+        state = {self.xd_ticket(), self.all_parameters_ticket()}
+        timed = state | {self.time_ticket()}
+        self._yaw_port = self.DeclareVectorOutputPort(
+            "yaw_command", 1, self._calc_yaw_command, timed
+        )
+        self._tau_port = self.DeclareVectorOutputPort(
+            "task_parameter", 2, self._calc_task_parameter, state
+        )
+        self._settled_port = self.DeclareVectorOutputPort(
+            "settled", 1, self._calc_settled, state
+        )
+        self._failed_port = self.DeclareVectorOutputPort(
+            "failed", 1, self._calc_failed, state
+        )
+        self._ready_port = self.DeclareVectorOutputPort(
+            "ready", 1, self._calc_ready, timed
+        )
+
+    @staticmethod
+    def AddToBuilder(
+        *,
+        builder: DiagramBuilder,
+        blob: OutputPort,
+        estimated_state: OutputPort,
+        yaw_index: int,
+        view: GazeView,
+        config: GazeConfig | None = None,
+        rate: float = 10.0,
+        latency: float = 0.0,
+    ) -> "GazeServo":
+        """Adds a servo wired to a blob sensor and to the joints' state."""
+        servo = builder.AddNamedSystem(
+            "gaze_servo",
+            GazeServo(
+                estimated_state.size() // 2,
+                yaw_index,
+                view,
+                config,
+                rate,
+                latency,
+            ),
+        )
+        builder.Connect(blob, servo.get_blob_input_port())
+        builder.Connect(estimated_state, servo.get_estimated_state_input_port())
+        return servo
+
+    def get_blob_input_port(self) -> InputPort:
+        return self._blob_port
+
+    def get_estimated_state_input_port(self) -> InputPort:
+        return self._state_port
+
+    def get_yaw_command_output_port(self) -> OutputPort:
+        return self._yaw_port
+
+    def get_task_parameter_output_port(self) -> OutputPort:
+        return self._tau_port
+
+    def get_settled_output_port(self) -> OutputPort:
+        return self._settled_port
+
+    def get_failed_output_port(self) -> OutputPort:
+        return self._failed_port
+
+    def get_ready_output_port(self) -> OutputPort:
+        return self._ready_port
+
+    # Parameters of a trial
+
+    def task(self, context: Context) -> GazeTask:
+        """What the servo is asked in this context."""
+        return GazeTask.from_vector(
+            context.get_numeric_parameter(self._task_index).CopyToVector()
+        )
+
+    def set_task(self, context: Context, task: GazeTask) -> None:
+        """Sets all that a trial asks of the servo."""
+        context.get_mutable_numeric_parameter(self._task_index).SetFromVector(
+            task.to_vector()
+        )
+
+    def set_enabled(self, context: Context, enabled: bool) -> None:
+        """Whether to look at all (not, while teaching or replaying)."""
+        task = self.task(context)
+        task.enabled = bool(enabled)
+        self.set_task(context, task)
+
+    def set_mode(self, context: Context, mode: GazeMode) -> None:
+        """Centre the marker, or look from a fixed yaw."""
+        task = self.task(context)
+        task.mode = GazeMode(mode)
+        self.set_task(context, task)
+
+    def set_fixed_yaw(self, context: Context, yaw: float) -> None:
+        """The yaw [rad] to look from in the mode FIXED_YAW."""
+        task = self.task(context)
+        task.fixed_yaw = float(yaw)
+        self.set_task(context, task)
+
+    def set_start_yaw(self, context: Context, yaw: float) -> None:
+        """The yaw [rad] of the start posture."""
+        task = self.task(context)
+        task.start_yaw = float(yaw)
+        self.set_task(context, task)
+
+    def reset(self, context: Context) -> None:
+        """Forgets all images, as at the start of a trial."""
+        context.SetDiscreteState(self._gaze_state, self._gaze.initial_state())
+        empty = np.zeros((self._queue, 5))
+        empty[:, 0] = -np.inf
+        context.SetDiscreteState(self._images, empty.ravel())
+
+    # Events
+
+    def _gaze_values(self, context: Context) -> np.ndarray:
+        return context.get_discrete_state(self._gaze_state).CopyToVector()
+
+    def _measure(self, context: Context) -> np.ndarray:
+        """One image as a row: time, x_img, y_img, found, yaw."""
+        blob = self._blob_port.Eval(context)
+        yaw = self._state_port.Eval(context)[self._yaw_index]
+        return np.array([context.get_time(), *blob, yaw])
+
+    def _take_in(
+        self, context: Context, images: np.ndarray, values: DiscreteValues
+    ) -> None:
+        """Hands the newest image that is old enough to the state machine."""
+        t = context.get_time()
+        usable = images[images[:, 0] <= t - self._latency + 1e-6]
+        if len(usable) == 0 or not np.isfinite(usable[-1, 0]):
+            return
+        image = usable[-1]
+        x = values.get_mutable_vector(self._gaze_state).get_mutable_value()
+        self._gaze.update(
+            x, t, image[1:4], image[4], image[0], self.task(context)
+        )
+
+    def _expose(self, context: Context, values: DiscreteValues) -> None:
+        if not self._gaze.wants_image(
+            self._gaze_values(context), self.task(context)
+        ):
+            return
+        queue = values.get_mutable_vector(self._images).get_mutable_value()
+        rows = queue.reshape(self._queue, 5)
+        rows[:-1] = rows[1:].copy()
+        rows[-1] = self._measure(context)
+
+    def _use(self, context: Context, values: DiscreteValues) -> None:
+        queue = context.get_discrete_state(self._images).CopyToVector()
+        self._take_in(context, queue.reshape(self._queue, 5), values)
+
+    def _expose_and_use(self, context: Context, values: DiscreteValues) -> None:
+        if not self._gaze.wants_image(
+            self._gaze_values(context), self.task(context)
+        ):
+            return
+        queue = context.get_discrete_state(self._images).CopyToVector()
+        rows = np.vstack(
+            [queue.reshape(self._queue, 5), self._measure(context)]
+        )
+        values.get_mutable_vector(self._images).SetFromVector(rows[1:].ravel())
+        self._take_in(context, rows, values)
+
+    # Outputs
+
+    def _calc_yaw_command(self, context: Context, output: BasicVector) -> None:
+        x = self._gaze_values(context)
+        yaw = self._gaze.yaw_command(x, context.get_time(), self.task(context))
+        output.SetFromVector([yaw])
+
+    def _calc_task_parameter(
+        self, context: Context, output: BasicVector
+    ) -> None:
+        x = self._gaze_values(context)
+        if self._gaze.is_settled(x, self.task(context)):
+            output.SetFromVector([x[TAU_1], x[TAU_2]])
+        else:
+            output.SetFromVector([0.0, 0.0])
+
+    def _calc_settled(self, context: Context, output: BasicVector) -> None:
+        x = self._gaze_values(context)
+        settled = self._gaze.is_settled(x, self.task(context))
+        output.SetFromVector([float(settled)])
+
+    def _calc_failed(self, context: Context, output: BasicVector) -> None:
+        x = self._gaze_values(context)
+        failed = self._gaze.is_failed(x, self.task(context))
+        output.SetFromVector([float(failed)])
+
+    def _calc_ready(self, context: Context, output: BasicVector) -> None:
+        x = self._gaze_values(context)
+        ready = self._gaze.is_ready(x, context.get_time(), self.task(context))
+        output.SetFromVector([float(ready)])
