@@ -19,6 +19,7 @@ from pydrake.systems.framework import Context
 
 from drake_affetto.errors import InputError, require, require_range
 from drake_affetto.resources import configure_parser, resolve
+from drake_affetto.scene.kinematics import SerialChain
 
 _PLACEMENT = "drum_placement"
 
@@ -381,3 +382,51 @@ def head_center_position(plant: MultibodyPlant, context: Context) -> np.ndarray:
     """World position [m] of the top centre of the drum's head, (3,)."""
     frame = plant.GetFrameByName("head_center")
     return frame.CalcPoseInWorld(context).translation()
+
+
+def serial_chain(plant: MultibodyPlant, frame_name: str) -> SerialChain:
+    """The chain of revolute joints from the world to the frame `frame_name`.
+
+    The plant must be finalized; welds are folded into the fixed poses.
+    """
+    frame = plant.GetFrameByName(frame_name)
+    moved_by = {
+        int(plant.get_joint(i).child_body().index()): plant.get_joint(i)
+        for i in plant.GetJointIndices()
+    }
+    names: list[str] = []
+    offsets: list[np.ndarray] = []
+    axes: list[np.ndarray] = []
+    limits: list[tuple[float, float]] = []
+    # From the tip inwards, `X` is the pose of the part already walked.
+    X = frame.GetFixedPoseInBodyFrame()
+    body = frame.body()
+    X_JT = None
+    while body.index() != plant.world_body().index():
+        joint = moved_by[int(body.index())]
+        X = joint.frame_on_child().GetFixedPoseInBodyFrame().inverse() @ X
+        if joint.num_positions() == 1:
+            if X_JT is None:
+                X_JT = X
+            else:
+                offsets.append(X.GetAsMatrix4())
+            names.append(joint.name())
+            axes.append(joint.revolute_axis())
+            limits.append(
+                (joint.position_lower_limit(), joint.position_upper_limit())
+            )
+            X = RigidTransform()
+        X = joint.frame_on_parent().GetFixedPoseInBodyFrame() @ X
+        body = joint.parent_body()
+    if X_JT is None:
+        raise InputError(f"frame {frame_name!r} is fixed in the world")
+    offsets.append(X.GetAsMatrix4())
+    lower, upper = np.array(limits[::-1]).T
+    return SerialChain(
+        names=tuple(names[::-1]),
+        X_PJ=np.array(offsets[::-1]),
+        axes=np.array(axes[::-1]),
+        X_JT=X_JT.GetAsMatrix4(),
+        lower=lower,
+        upper=upper,
+    )
