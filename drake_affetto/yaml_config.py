@@ -62,7 +62,7 @@ def typed(
     try:
         return yaml_load_typed(
             schema=schema,
-            data=data,
+            data=yaml.safe_dump(data),
             defaults=copy.deepcopy(defaults),
             retain_map_defaults=True,
         )
