@@ -33,7 +33,6 @@ for version in $versions; do
         "${PYENV_ROOT:-$HOME/.pyenv}/versions/$version"*/bin/python \
         "${XDG_DATA_HOME:-$HOME/.local/share}/uv/python/cpython-$version"*/bin/python3 \
         "/usr/local/bin/python$version" \
-        "/opt/homebrew/bin/python$version" \
         "/usr/bin/python$version" \
         python3 python; do
         try "$version" "$candidate" && break

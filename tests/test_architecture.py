@@ -1,0 +1,203 @@
+"""Rules of the house that no tool checks: who may import whom, and so on."""
+
+import ast
+from collections.abc import Iterator
+import os
+from pathlib import Path
+import re
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "drake_affetto"
+
+# The way of the signal, then what is built on it. Nothing imports from a later
+# place; what stands in one place may import each other.
+ORDER = [
+    {"", "errors", "output", "resources", "yaml_config"},
+    {"scene"},
+    {"perception"},
+    {"skill"},
+    {"motion"},
+    {"control"},
+    {"pneumatics"},
+    {"sound"},
+    {"teaching"},
+    {"scenario"},
+    {"station"},
+    {"diagram"},
+    {"studies"},
+    {"cli"},
+]
+RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
+STAGES = [name for names in ORDER[1:9] for name in names]
+
+# The mathematics, which must also serve who has no Drake. The test adds to
+# them every module of a stage that does not import Drake in its own text.
+DRAKE_FREE = {
+    "drake_affetto",
+    "drake_affetto.cli",
+    "drake_affetto.errors",
+    "drake_affetto.motion.dmp",
+    "drake_affetto.output",
+    "drake_affetto.perception.optics",
+    "drake_affetto.pneumatics.flow",
+    "drake_affetto.resources",
+    "drake_affetto.sound.voice",
+    "drake_affetto.teaching.stroke",
+    *(f"drake_affetto.{stage}" for stage in STAGES),
+}
+
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+
+def module_name(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def imports(node: ast.AST, *, top_only: bool) -> Iterator[str]:
+    """The modules that are imported; at the top of the file or anywhere."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.Import):
+            yield from (alias.name for alias in child.names)
+        elif isinstance(child, ast.ImportFrom):
+            assert child.level == 0, "imports are absolute here"
+            assert child.module is not None
+            yield child.module
+            # `from drake_affetto import cli` imports a module too.
+            if child.module == "drake_affetto":
+                for alias in child.names:
+                    if not alias.name.startswith("_"):
+                        yield f"drake_affetto.{alias.name}"
+        elif isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(
+            child.test
+        ):
+            if not top_only:
+                yield from imports(child, top_only=False)
+        elif not top_only or not isinstance(
+            child, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
+        ):
+            yield from imports(child, top_only=top_only)
+
+
+def place(module: str) -> str:
+    """The stage or module of drake_affetto in which `module` stands."""
+    return module.split(".")[1] if "." in module else ""
+
+
+@pytest.mark.parametrize("path", MODULES, ids=module_name)
+def test_imports_run_one_way(path):
+    own = place(module_name(path))
+    assert own in RANK, f"{path.name} needs a place in ORDER"
+    for module in imports(ast.parse(path.read_text()), top_only=False):
+        if module.split(".")[0] != "drake_affetto":
+            assert module != "pydrake.all", "name what is needed"
+            continue
+        there = place(module)
+        assert there in RANK, f"{module} needs a place in ORDER"
+        # The front page of a stage may pass on what is put together later,
+        # where it waits until it is asked.
+        if own == "scene" and there == "scenario":
+            top = imports(ast.parse(path.read_text()), top_only=True)
+            assert path.name == "__init__.py"
+            assert module not in top
+            continue
+        assert RANK[there] <= RANK[own], f"{own} imports the later {there}"
+
+
+@pytest.mark.parametrize("path", MODULES, ids=module_name)
+def test_every_module_says_what_it_is(path):
+    assert ast.get_docstring(ast.parse(path.read_text()))
+
+
+def test_every_folder_with_code_is_a_package():
+    folders = {path.parent for path in MODULES}
+    assert all((folder / "__init__.py").is_file() for folder in folders)
+
+
+def test_mathematics_import_without_drake():
+    modules = set(DRAKE_FREE)
+    for path in MODULES:
+        top = set(imports(ast.parse(path.read_text()), top_only=True))
+        drake = any(name.split(".")[0] == "pydrake" for name in top)
+        # The world's mathematics are Drake's own; the stages after it have
+        # theirs apart.
+        if place(module_name(path)) in set(STAGES) - {"scene"} and not drake:
+            modules.add(module_name(path))
+    code = (
+        "import importlib, sys\n"
+        "sys.modules['pydrake'] = None\n"
+        f"for name in {sorted(modules)!r}:\n"
+        "    try:\n"
+        "        importlib.import_module(name)\n"
+        "    except ImportError as error:\n"
+        "        print(f'{name}: {error}')\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+    )
+    assert (done.stdout, done.stderr, done.returncode) == ("", "", 0)
+
+
+# What ties a file to one machine, put together so as not to name it here.
+_PLACES = "|".join(("home", "root", "work", "Users", "tmp", "opt", "mnt"))
+_HOSTS = "|".join(
+    ".".join(parts)
+    for parts in (
+        ("pypi", "org"),
+        ("pythonhosted", "org"),
+        ("anaconda", "org"),
+        ("npmjs", "org"),
+        ("docker", "io"),
+        ("ghcr", "io"),
+    )
+)
+FOREIGN = re.compile(
+    rf"(?<![\w.$~}}*/:-])/(?:{_PLACES})/\w|{_HOSTS.replace('.', '[.]')}"
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "is_foreign"),
+    [
+        ("see " + "/ho" + "me/someone/file", True),
+        ('"' + "/wo" + 'rk/shared"', True),
+        ("pip install -i htt" + "ps://py" + "pi.org/simple", True),
+        ("../shared/DESIGN.md", False),
+        ("models/work/part.sdf", False),
+        ("package://drake_affetto/sdf/x.sdf", False),
+        ("$HOME/root/file", False),
+        ("/usr/bin/python3.11", False),
+    ],
+)
+def test_search_for_machine_names_finds_what_it_should(text, is_foreign):
+    assert bool(FOREIGN.search(text)) == is_foreign
+
+
+def test_no_file_names_a_machine_or_a_package_host():
+    if shutil.which("git") is None or not (ROOT / ".git").exists():
+        pytest.skip("not a git checkout")
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True
+    )
+    found = []
+    for name in os.fsdecode(listed.stdout).split("\0"):
+        path = ROOT / name
+        if not name or not path.is_file():
+            continue
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError:
+            continue
+        for number, line in enumerate(text.splitlines(), start=1):
+            if FOREIGN.search(line):
+                found.append(f"{name}:{number}: {line.strip()[:100]}")
+    assert found == []
