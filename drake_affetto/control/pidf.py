@@ -1,0 +1,233 @@
+"""PIDF control of antagonistic chamber pressures.
+
+The controller asks for a pressure difference by PID on the joint angle and
+opens the valves in proportion to what is missing of it (the F part):
+
+    u = kP e + kI ∫e dt + kD ė + u_eq,   e = q_des - q,
+    v⁺ = clip(kF (u - (p_a - p_b)), -1, 1),   v⁻ = -v⁺.
+
+u_eq is an equilibrium offset: with it the joint can be held, for instance
+while somebody leads it by the hand, with small gains and without integral.
+"""
+
+import dataclasses
+from pathlib import Path
+from typing import Self
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from drake_affetto.errors import InputError, require, require_range
+from drake_affetto.resources import resolve
+
+DEFAULT_FILE = "package://drake_affetto/control.yaml"
+
+
+@dataclasses.dataclass
+class JointGains:
+    """Gains of one joint.
+
+    Args:
+        kP: Pa/rad.
+        kI: Pa/(rad s).
+        kD: Pa s/rad.
+        kF: valve opening per pressure difference, 1/Pa.
+    """
+
+    kP: float = 5e5
+    kI: float = 3e5
+    kD: float = 2.5e4
+    kF: float = 1.5e-5
+
+    def check(self, where: str) -> None:
+        """Raises InputError naming the first gain that is negative."""
+        for field in ("kP", "kI", "kD", "kF"):
+            require_range(f"{where}.{field}", getattr(self, field), 0.0)
+
+
+@dataclasses.dataclass
+class PidfGains:
+    """Gains of `n` joints, arrays (n) in the units of `JointGains`."""
+
+    kP: NDArray[np.float64]
+    kI: NDArray[np.float64]
+    kD: NDArray[np.float64]
+    kF: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        """Makes float copies; raises InputError where they do not fit."""
+        self.kP = np.array(self.kP, dtype=float)
+        require(
+            self.kP.ndim == 1 and self.kP.size > 0,
+            "kP",
+            self.kP,
+            "an array of one gain for each joint",
+        )
+        for field in ("kP", "kI", "kD", "kF"):
+            value = np.array(getattr(self, field), dtype=float)
+            require(
+                value.shape == self.kP.shape
+                and bool(np.all(np.isfinite(value) & (value >= 0.0))),
+                field,
+                value,
+                f"{self.kP.size} gains of at least 0",
+            )
+            setattr(self, field, value)
+
+    @classmethod
+    def from_array(cls, array: ArrayLike) -> Self:
+        """The gains whose rows are kP, kI, kD and kF."""
+        return cls(*np.asarray(array, dtype=float))
+
+    def to_array(self) -> NDArray[np.float64]:
+        """(4, n) array with the rows kP, kI, kD and kF."""
+        return np.stack([self.kP, self.kI, self.kD, self.kF])
+
+    def scaled(self, factor: float, *, integral: float = 0.0) -> "PidfGains":
+        """Gains for leading the joints by hand.
+
+        Args:
+            factor: of kP and kD, in 0 to 1 for a compliant joint.
+            integral: of kI; none by default, for the hand would be fought by
+                an integrator.
+
+        Returns:
+            New gains with the same kF.
+        """
+        require_range("factor", factor, 0.0)
+        require_range("integral", integral, 0.0)
+        return PidfGains(
+            factor * self.kP, integral * self.kI, factor * self.kD, self.kF
+        )
+
+
+@dataclasses.dataclass
+class ControlParameters:
+    """Gains of the joints by their names, and the limits of the control.
+
+    Args:
+        integral_limit: greatest part of u that the integral may ask for, Pa.
+        difference_limit: greatest pressure difference u asked for, Pa.
+        gains: gains by joint name.
+    """
+
+    integral_limit: float = 300e3
+    difference_limit: float = 550e3
+    gains: dict[str, JointGains] = dataclasses.field(default_factory=dict)
+
+    def check(self, where: str) -> None:
+        """Raises InputError naming the first field that does not fit."""
+        require_range(f"{where}.integral_limit", self.integral_limit, 0.0)
+        require_range(f"{where}.difference_limit", self.difference_limit, 0.0)
+        for name, gains in self.gains.items():
+            gains.check(f"{where}.gains.{name}")
+
+    def for_joints(self, names: list[str]) -> PidfGains:
+        """The gains of the joints named, in that order.
+
+        Raises:
+            InputError: for a joint that has none.
+        """
+        for name in names:
+            if name not in self.gains:
+                known = ", ".join(self.gains) or "none"
+                raise InputError(f"no gains for joint {name!r}; known: {known}")
+        rows = [self.gains[name] for name in names]
+        return PidfGains(
+            kP=np.array([g.kP for g in rows]),
+            kI=np.array([g.kI for g in rows]),
+            kD=np.array([g.kD for g in rows]),
+            kF=np.array([g.kF for g in rows]),
+        )
+
+
+def load_control(
+    file: str | Path = DEFAULT_FILE, overlays: tuple[str | Path, ...] = ()
+) -> ControlParameters:
+    """Reads gains and limits from a YAML file of `ControlParameters`.
+
+    Args:
+        file: the file, or its package:// URI.
+        overlays: further ones, each holding only what it changes.
+
+    Raises:
+        InputError: for a file or a value that does not fit, by name.
+    """
+    # Drake's YAML reader is behind this; the mathematics need none of it.
+    from drake_affetto.yaml_config import read_yaml, typed
+
+    parameters = ControlParameters()
+    for item in (file, *overlays):
+        path = resolve(item)
+        parameters = typed(
+            ControlParameters,
+            read_yaml(path),
+            where=path.name,
+            defaults=parameters,
+        )
+    parameters.check(Path(str(file)).name)
+    return parameters
+
+
+@numba.njit(cache=True)
+def pidf_update(
+    h: float,
+    gains: NDArray[np.float64],
+    integral_limit: float,
+    difference_limit: float,
+    desired_state: NDArray[np.float64],
+    estimated_state: NDArray[np.float64],
+    pressure: NDArray[np.float64],
+    offset: NDArray[np.float64],
+    integral: NDArray[np.float64],
+    demand: NDArray[np.float64],
+    opening: NDArray[np.float64],
+) -> None:
+    """One update of the controller, in place.
+
+    The integral is frozen while it would push a limited signal (the valve or
+    the demand) further into its limit, and held within its own limit.
+
+    Args:
+        h: period of the updates, s.
+        gains: (4, n) rows kP, kI, kD, kF.
+        integral_limit: limit of kI ∫e dt, Pa.
+        difference_limit: limit of the demand u, Pa.
+        desired_state: (2n) [q_des; q̇_des], rad and rad/s.
+        estimated_state: (2n) [q; q̇].
+        pressure: (2n) [p_a; p_b], Pa.
+        offset: (n) u_eq, Pa.
+        integral: (n) ∫e dt, rad s; advanced.
+        demand: (n) u, Pa; set.
+        opening: (n) v⁺ in [-1, 1]; set.
+    """
+    n = gains.shape[1]
+    for i in range(n):
+        error = desired_state[i] - estimated_state[i]
+        error_rate = desired_state[n + i] - estimated_state[n + i]
+        k_i = gains[1, i]
+        proportional = gains[0, i] * error + gains[2, i] * error_rate
+        difference = pressure[i] - pressure[n + i]
+
+        trial = integral[i] + h * error
+        u = proportional + offset[i] + k_i * trial
+        v = gains[3, i] * (
+            min(max(u, -difference_limit), difference_limit) - difference
+        )
+        limited = abs(v) > 1.0 or abs(u) > difference_limit
+        driving = u - difference if abs(v) > 1.0 else u
+        if limited and driving * error > 0.0:
+            trial = integral[i]
+        if k_i > 0.0:
+            bound = integral_limit / k_i
+            trial = min(max(trial, -bound), bound)
+        else:
+            trial = 0.0
+        integral[i] = trial
+
+        u = proportional + offset[i] + k_i * trial
+        u = min(max(u, -difference_limit), difference_limit)
+        demand[i] = u
+        v = gains[3, i] * (u - difference)
+        opening[i] = min(max(v, -1.0), 1.0)

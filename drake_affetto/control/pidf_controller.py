@@ -1,0 +1,246 @@
+"""The PIDF controller as a system."""
+
+from collections.abc import Sequence
+import dataclasses
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiagramBuilder,
+    DiscreteValues,
+    EventStatus,
+    InputPort,
+    LeafSystem,
+    OutputPort,
+)
+
+from drake_affetto.control.pidf import (
+    DEFAULT_FILE,
+    PidfGains,
+    load_control,
+    pidf_update,
+)
+from drake_affetto.errors import require, require_range
+
+
+@dataclasses.dataclass
+class PidfConfig:
+    """How the joint controllers of a scenario are made.
+
+    Args:
+        parameters: YAML file of `ControlParameters`.
+        overlays: YAML files that change some of them.
+        period: of the updates, s.
+    """
+
+    parameters: str = DEFAULT_FILE
+    overlays: list[str] = dataclasses.field(default_factory=list)
+    period: float = 0.005
+
+    def check(self, where: str) -> None:
+        """Raises InputError naming the first field that cannot be."""
+        require_range(f"{where}.period", self.period, 1e-4, 0.1)
+
+
+class PidfController(LeafSystem):
+    """PIDF control of `n` joints at a fixed rate, valves held in between.
+
+    .. pydrake_system::
+
+        name: PidfController
+        input_ports:
+        - desired_state
+        - estimated_state
+        - chamber_pressure
+        - equilibrium_offset (optional)
+        output_ports:
+        - valve_opening
+        - pid_output
+
+    - `desired_state` (2n): [q_des; q̇_des], rad and rad/s.
+    - `estimated_state` (2n): [q; q̇].
+    - `chamber_pressure` (2n): [p_a; p_b], Pa.
+    - `equilibrium_offset` (n): u_eq added to the demand, Pa; 0 if the port is
+      not connected.
+    - `valve_opening` (n): v⁺ in [-1, 1].
+    - `pid_output` (n): the demanded pressure difference u, the offset in it,
+      Pa. Read while the robot holds a posture at rest it is the u_eq with
+      which the posture can be held without integral.
+
+    Both outputs are state. The gains are a numeric parameter of the context
+    (`set_gains`).
+    """
+
+    def __init__(
+        self,
+        gains: PidfGains,
+        *,
+        period: float = 0.005,
+        integral_limit: float = 300e3,
+        difference_limit: float = 550e3,
+    ):
+        """Declares ports, state and the periodic update.
+
+        Args:
+            gains: gains of the n joints.
+            period: of the updates, s.
+            integral_limit: greatest part of u from the integral, Pa.
+            difference_limit: greatest |u|, Pa.
+
+        Raises:
+            InputError: for arguments that do not fit.
+        """
+        LeafSystem.__init__(self)
+        PidfConfig(period=period).check("PidfController")
+        require_range("integral_limit", integral_limit, 0.0)
+        require_range("difference_limit", difference_limit, 0.0)
+        n = gains.kP.size
+        self._n = n
+        self._period = float(period)
+        self._limits = (float(integral_limit), float(difference_limit))
+        self._gains_index = int(
+            self.DeclareNumericParameter(BasicVector(gains.to_array().ravel()))
+        )
+        self._desired_port = self.DeclareVectorInputPort("desired_state", 2 * n)
+        self._state_port = self.DeclareVectorInputPort("estimated_state", 2 * n)
+        self._pressure_port = self.DeclareVectorInputPort(
+            "chamber_pressure", 2 * n
+        )
+        self._offset_port = self.DeclareVectorInputPort("equilibrium_offset", n)
+        self._no_offset = np.zeros(n)
+        self._integral_index = self.DeclareDiscreteState(n)
+        self._demand_index = self.DeclareDiscreteState(n)
+        self._opening_index = self.DeclareDiscreteState(n)
+        self._opening_port = self.DeclareStateOutputPort(
+            "valve_opening", self._opening_index
+        )
+        self._demand_port = self.DeclareStateOutputPort(
+            "pid_output", self._demand_index
+        )
+        self.DeclarePeriodicDiscreteUpdateEvent(
+            period_sec=self._period, offset_sec=0.0, update=self._update
+        )
+
+    @staticmethod
+    def AddToBuilder(
+        *,
+        builder: DiagramBuilder,
+        config: PidfConfig,
+        joint_names: Sequence[str],
+        name: str = "pidf_controller",
+    ) -> "PidfController":
+        """Adds the controller of the joints named to `builder`.
+
+        Raises:
+            InputError: where the configuration does not fit.
+        """
+        config.check(name)
+        parameters = load_control(config.parameters, tuple(config.overlays))
+        system = PidfController(
+            parameters.for_joints(list(joint_names)),
+            period=config.period,
+            integral_limit=parameters.integral_limit,
+            difference_limit=parameters.difference_limit,
+        )
+        return builder.AddNamedSystem(name, system)
+
+    def get_desired_state_input_port(self) -> InputPort:
+        """[q_des; q̇_des] (2n), rad and rad/s."""
+        return self._desired_port
+
+    def get_estimated_state_input_port(self) -> InputPort:
+        """[q; q̇] (2n), rad and rad/s."""
+        return self._state_port
+
+    def get_chamber_pressure_input_port(self) -> InputPort:
+        """[p_a; p_b] (2n), Pa."""
+        return self._pressure_port
+
+    def get_equilibrium_offset_input_port(self) -> InputPort:
+        """u_eq (n), Pa."""
+        return self._offset_port
+
+    def get_valve_opening_output_port(self) -> OutputPort:
+        """v⁺ (n) in [-1, 1]."""
+        return self._opening_port
+
+    def get_pid_output_output_port(self) -> OutputPort:
+        """u (n), Pa."""
+        return self._demand_port
+
+    @property
+    def num_joints(self) -> int:
+        """Number of joints n."""
+        return self._n
+
+    @property
+    def period(self) -> float:
+        """Update period, s."""
+        return self._period
+
+    def get_gains(self, context: Context) -> PidfGains:
+        """The gains in `context`."""
+        vector = context.get_numeric_parameter(self._gains_index)
+        return PidfGains.from_array(vector.CopyToVector().reshape(4, self._n))
+
+    def set_gains(self, context: Context, gains: PidfGains) -> None:
+        """Changes the gains; the integral is kept where kI stays above 0.
+
+        Raises:
+            InputError: for the gains of another number of joints.
+        """
+        require(
+            gains.kP.shape == (self._n,),
+            "gains",
+            gains.kP.size,
+            f"gains of {self._n} joints",
+        )
+        vector = context.get_mutable_numeric_parameter(self._gains_index)
+        vector.SetFromVector(gains.to_array().ravel())
+
+    def reset(self, context: Context, demand: ArrayLike = 0.0) -> None:
+        """Clears the integral and closes the valves.
+
+        Args:
+            context: this system's context.
+            demand: what `pid_output` shows until the next update, Pa.
+        """
+        zeros = np.zeros(self._n)
+        context.SetDiscreteState(self._integral_index, zeros)
+        context.SetDiscreteState(self._demand_index, zeros + demand)
+        context.SetDiscreteState(self._opening_index, zeros)
+
+    def set_integral(self, context: Context, pressure: ArrayLike) -> None:
+        """Sets the integral so that it asks for `pressure` (n), Pa.
+
+        Started so, a controller takes a posture over without a sag. Joints
+        without kI are left at 0.
+        """
+        k_i = self.get_gains(context).kI
+        share = np.broadcast_to(np.asarray(pressure, dtype=float), (self._n,))
+        integral = np.divide(share, k_i, out=np.zeros(self._n), where=k_i > 0.0)
+        context.SetDiscreteState(self._integral_index, integral)
+
+    def _update(
+        self, context: Context, discrete_state: DiscreteValues
+    ) -> EventStatus:
+        offset = self._no_offset
+        if self._offset_port.HasValue(context):
+            offset = self._offset_port.Eval(context)
+        pidf_update(
+            self._period,
+            context.get_numeric_parameter(self._gains_index)
+            .value()
+            .reshape(4, self._n),
+            *self._limits,
+            self._desired_port.Eval(context),
+            self._state_port.Eval(context),
+            self._pressure_port.Eval(context),
+            offset,
+            discrete_state.get_mutable_value(self._integral_index),
+            discrete_state.get_mutable_value(self._demand_index),
+            discrete_state.get_mutable_value(self._opening_index),
+        )
+        return EventStatus.Succeeded()

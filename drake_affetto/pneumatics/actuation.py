@@ -1,0 +1,355 @@
+"""The actuators as a system: valve commands in, joint torques out."""
+
+from collections.abc import Sequence
+import dataclasses
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiagramBuilder,
+    DiscreteValues,
+    EventStatus,
+    InputPort,
+    LeafSystem,
+    OutputPort,
+)
+
+from drake_affetto.errors import require, require_range
+from drake_affetto.pneumatics.chamber import (
+    FLOW_MODE,
+    REGULATOR_MODE,
+    ROWS,
+    Row,
+    line_slots,
+    memory_size,
+    step_joints,
+)
+from drake_affetto.pneumatics.parameters import (
+    DEFAULT_FILE,
+    largest_dead_time,
+    load_parameters,
+    resting_pressure,
+)
+
+_MODES = {"flow": FLOW_MODE, "regulator": REGULATOR_MODE}
+
+
+@dataclasses.dataclass
+class PneumaticActuationConfig:
+    """How the actuators of a scenario are made.
+
+    Args:
+        mode: "flow" (the command is the valves' opening) or "regulator" (it
+            is a pressure set-point for each chamber).
+        parameters: YAML file of `PneumaticParameters`.
+        overlays: YAML files that change some of them, for instance a fit.
+        time_step: update period, s; the plant's.
+    """
+
+    mode: str = "flow"
+    parameters: str = DEFAULT_FILE
+    overlays: list[str] = dataclasses.field(default_factory=list)
+    time_step: float = 0.001
+
+    def check(self, where: str) -> None:
+        """Raises InputError naming the first field that cannot be."""
+        require(
+            self.mode in _MODES,
+            f"{where}.mode",
+            self.mode,
+            "'flow' or 'regulator'",
+        )
+        require_range(f"{where}.time_step", self.time_step, 1e-6, 0.01)
+
+
+class PneumaticActuation(LeafSystem):
+    """Valves, chambers and dry friction of `n` joints, one compiled update.
+
+    .. pydrake_system::
+
+        name: PneumaticActuation
+        input_ports:
+        - valve_opening (in flow mode)
+        - pressure_command (in regulator mode)
+        - estimated_state
+        output_ports:
+        - actuation
+        - chamber_pressure
+        - mass_flow
+
+    - `valve_opening` (n): v⁺ in [-1, 1], positive fills chamber a and empties
+      chamber b (v⁻ = -v⁺); clipped.
+    - `pressure_command` (2n): set-points [p_a; p_b], Pa absolute.
+    - `estimated_state` (2n): [q; q̇], rad and rad/s.
+    - `actuation` (n): torque on the joint, N m: of both chambers, minus
+      Coulomb and Stribeck friction. Viscous friction is the plant's damping.
+    - `chamber_pressure` (2n): [p_a; p_b], Pa absolute.
+    - `mass_flow` (2n): mean flow into each chamber over the last step, kg/s;
+      negative while it vents.
+
+    All outputs are state, advanced every `time_step`: reading them costs no
+    call into Python. The parameter array of `chamber.Row` is a numeric
+    parameter of the context, so that actuators can be varied without building
+    a new diagram.
+    """
+
+    def __init__(
+        self,
+        parameters: NDArray[np.float64],
+        *,
+        mode: str = "flow",
+        time_step: float = 0.001,
+        max_dead_time: float | None = None,
+    ):
+        """Declares ports, state and the periodic update.
+
+        Args:
+            parameters: (ROWS, n) array, from `PneumaticParameters.for_joints`.
+            mode: "flow" or "regulator".
+            time_step: update period, s; the plant's.
+            max_dead_time: longest dead time that parameters set later may
+                have, s; by default the longest among `parameters`.
+
+        Raises:
+            InputError: for arguments that do not fit.
+        """
+        LeafSystem.__init__(self)
+        config = PneumaticActuationConfig(mode=mode, time_step=time_step)
+        config.check("PneumaticActuation")
+        array = np.array(parameters, dtype=float)
+        require(
+            array.ndim == 2 and array.shape[0] == ROWS and array.shape[1] > 0,
+            "parameters",
+            array.shape,
+            f"an array of shape ({ROWS}, n)",
+        )
+        self._n = array.shape[1]
+        self._shape = array.shape
+        self._mode = _MODES[mode]
+        self._time_step = float(time_step)
+        if max_dead_time is None:
+            max_dead_time = largest_dead_time(array)
+        self._slots = line_slots(self._time_step, max_dead_time)
+        n = self._n
+
+        # The array is kept flat, in column order of no consequence outside.
+        self._parameter_index = int(
+            self.DeclareNumericParameter(BasicVector(array.ravel()))
+        )
+        if self._mode == FLOW_MODE:
+            self._command_port = self.DeclareVectorInputPort("valve_opening", n)
+        else:
+            self._command_port = self.DeclareVectorInputPort(
+                "pressure_command", 2 * n
+            )
+        self._state_port = self.DeclareVectorInputPort("estimated_state", 2 * n)
+
+        rest = resting_pressure(array)
+        pressure = np.concatenate([rest, rest])
+        self._pressure_index = self.DeclareDiscreteState(pressure)
+        self._torque_index = self.DeclareDiscreteState(
+            _chamber_torque(array, pressure)
+        )
+        self._flow_index = self.DeclareDiscreteState(2 * n)
+        self._memory_index = self.DeclareDiscreteState(
+            memory_size(n, self._time_step, max_dead_time)
+        )
+        self._torque_port = self.DeclareStateOutputPort(
+            "actuation", self._torque_index
+        )
+        self._pressure_port = self.DeclareStateOutputPort(
+            "chamber_pressure", self._pressure_index
+        )
+        self._flow_port = self.DeclareStateOutputPort(
+            "mass_flow", self._flow_index
+        )
+        self.DeclarePeriodicDiscreteUpdateEvent(
+            period_sec=self._time_step, offset_sec=0.0, update=self._update
+        )
+
+    @staticmethod
+    def AddToBuilder(
+        *,
+        builder: DiagramBuilder,
+        config: PneumaticActuationConfig,
+        joint_names: Sequence[str],
+        q_lower: ArrayLike,
+        q_upper: ArrayLike,
+        name: str = "pneumatic_actuation",
+    ) -> "PneumaticActuation":
+        """Adds the actuators of the joints named to `builder`.
+
+        Raises:
+            InputError: where the configuration does not fit.
+        """
+        config.check(name)
+        parameters = load_parameters(config.parameters, config.overlays)
+        system = PneumaticActuation(
+            parameters.for_joints(joint_names, q_lower, q_upper),
+            mode=config.mode,
+            time_step=config.time_step,
+        )
+        return builder.AddNamedSystem(name, system)
+
+    def get_command_input_port(self) -> InputPort:
+        """`valve_opening` or `pressure_command`, whichever the mode has."""
+        return self._command_port
+
+    def get_estimated_state_input_port(self) -> InputPort:
+        """[q; q̇] (2n), rad and rad/s."""
+        return self._state_port
+
+    def get_actuation_output_port(self) -> OutputPort:
+        """Torque on each joint (n), N m."""
+        return self._torque_port
+
+    def get_chamber_pressure_output_port(self) -> OutputPort:
+        """[p_a; p_b] (2n), Pa absolute."""
+        return self._pressure_port
+
+    def get_mass_flow_output_port(self) -> OutputPort:
+        """Flow into each chamber (2n), kg/s."""
+        return self._flow_port
+
+    @property
+    def num_joints(self) -> int:
+        """Number of joints n."""
+        return self._n
+
+    @property
+    def time_step(self) -> float:
+        """Update period, s."""
+        return self._time_step
+
+    def get_parameters(self, context: Context) -> NDArray[np.float64]:
+        """A copy of the (ROWS, n) parameter array."""
+        vector = context.get_numeric_parameter(self._parameter_index)
+        return vector.CopyToVector().reshape(self._shape)
+
+    def set_parameters(
+        self, context: Context, parameters: NDArray[np.float64]
+    ) -> None:
+        """Changes the actuators, for instance for a randomised trial.
+
+        Raises:
+            InputError: for another shape, or a dead time longer than the one
+                that the system was built for.
+        """
+        array = np.array(parameters, dtype=float)
+        require(
+            array.shape == self._shape,
+            "parameters",
+            array.shape,
+            f"an array of shape {self._shape}",
+        )
+        longest = largest_dead_time(array)
+        require(
+            line_slots(self._time_step, longest) <= self._slots,
+            "dead time",
+            longest,
+            f"at most {(self._slots - 2) * self._time_step:g} s",
+        )
+        vector = context.get_mutable_numeric_parameter(self._parameter_index)
+        vector.SetFromVector(array.ravel())
+
+    def set_pressures(
+        self, context: Context, p_a: ArrayLike, p_b: ArrayLike
+    ) -> None:
+        """Resets the whole state with the given pressures in the chambers.
+
+        Valves are at rest, nothing is under way in the lines, the air has
+        ambient temperature and friction holds no torque. Volumes are those of
+        the joint angles at the next update: call it after placing the robot.
+
+        Args:
+            context: this system's context.
+            p_a: pressures of chambers a (n, or one for all), Pa absolute.
+            p_b: those of chambers b.
+
+        Raises:
+            InputError: for pressures that are not positive or do not fit.
+        """
+        n = self._n
+        pressure = np.empty(2 * n)
+        for part, name, value in (
+            (pressure[:n], "p_a", p_a),
+            (pressure[n:], "p_b", p_b),
+        ):
+            given = np.asarray(value, dtype=float)
+            require(
+                given.shape in ((), (1,), (n,))
+                and bool(np.all((given > 0.0) & np.isfinite(given))),
+                name,
+                value,
+                f"{n} absolute pressures above 0 Pa",
+            )
+            part[:] = given
+        torque = _chamber_torque(self.get_parameters(context), pressure)
+        context.SetDiscreteState(self._pressure_index, pressure)
+        context.SetDiscreteState(self._torque_index, torque)
+        context.SetDiscreteState(self._flow_index, np.zeros(2 * n))
+        memory = context.get_discrete_state(self._memory_index)
+        context.SetDiscreteState(self._memory_index, np.zeros(memory.size()))
+
+    def reset(self, context: Context) -> None:
+        """Resets the whole state at the pressures of the valves' rest."""
+        rest = resting_pressure(self.get_parameters(context))
+        self.set_pressures(context, rest, rest)
+
+    def pressures_for_torque(
+        self, context: Context, torque: ArrayLike, mean: ArrayLike | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Chamber pressures that give `torque` at a mean pressure.
+
+        Args:
+            context: this system's context.
+            torque: (n) N m, for instance what holds the arm against gravity.
+            mean: mean pressure, Pa absolute, scalar or (n); by default the
+                pressure of the valves' rest.
+
+        Returns:
+            p_a and p_b (n each), Pa absolute, within atmosphere and supply.
+        """
+        array = self.get_parameters(context)
+        if mean is None:
+            mean = resting_pressure(array)
+        mean = np.asarray(mean, dtype=float)
+        gauge = mean - array[Row.ATMOSPHERE]
+        K_a, K_b = array[Row.K_A], array[Row.K_B]
+        shift = (np.asarray(torque) - (K_a - K_b) * gauge) / (K_a + K_b)
+        low, high = array[Row.ATMOSPHERE], array[Row.SUPPLY]
+        return (
+            np.clip(mean + shift, low, high),
+            np.clip(mean - shift, low, high),
+        )
+
+    def _update(
+        self, context: Context, discrete_state: DiscreteValues
+    ) -> EventStatus:
+        step_joints(
+            self._time_step,
+            self._mode,
+            context.get_numeric_parameter(self._parameter_index)
+            .value()
+            .reshape(self._shape),
+            self._command_port.Eval(context),
+            self._state_port.Eval(context),
+            discrete_state.get_mutable_value(self._pressure_index),
+            discrete_state.get_mutable_value(self._torque_index),
+            discrete_state.get_mutable_value(self._flow_index),
+            discrete_state.get_mutable_value(self._memory_index),
+        )
+        return EventStatus.Succeeded()
+
+
+def _chamber_torque(
+    parameters: NDArray[np.float64], pressure: NDArray[np.float64]
+) -> Any:
+    """Torque of both chambers (n), N m, without friction."""
+    n = parameters.shape[1]
+    gauge_a = pressure[:n] - parameters[Row.ATMOSPHERE]
+    gauge_b = pressure[n:] - parameters[Row.ATMOSPHERE]
+    return parameters[Row.K_A] * gauge_a - parameters[Row.K_B] * gauge_b

@@ -1,0 +1,366 @@
+"""What the actuators are made of: typed configuration to parameter arrays."""
+
+from collections.abc import Sequence
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from drake_affetto.errors import InputError, require, require_range
+from drake_affetto.pneumatics.chamber import ROWS, Row, chamber_flows
+from drake_affetto.pneumatics.chamber import opening_fraction
+from drake_affetto.resources import resolve
+
+DEFAULT_FILE = "package://drake_affetto/pneumatics.yaml"
+
+
+@dataclasses.dataclass
+class ActuatorClass:
+    """One size of cylinder or vane, its two valves, lines and seals.
+
+    Args:
+        torque_constant: K_a, torque per pressure in chamber a and volume per
+            angle, N m/Pa = m³/rad.
+        area_ratio: K_b/K_a; below 1 for the rod side of a cylinder.
+        dead_volume: of each chamber at the end of its stroke, with line, m³.
+        fill_conductance: sonic conductance supply to chamber, m³/(s Pa).
+        exhaust_conductance: chamber to atmosphere, m³/(s Pa).
+        leak_conductance: chamber to atmosphere past the seals, always open.
+        critical_ratio: critical pressure ratio b of all three.
+        underlap: opening of both edges of a valve at rest, as a fraction of
+            its full stroke. Negative: a dead band of that size.
+        valve_lag: time constant of the valve's spool, s.
+        dead_time: from command to spool: electronics and line, s.
+        regulator_gain: opening per pressure error in regulator mode, 1/Pa.
+        coulomb_torque: sliding friction, N m.
+        breakaway_torque: greatest friction at rest, N m.
+        stribeck_velocity: width of the fall from one to the other, rad/s.
+        bristle_deflection: angle by which the joint gives before it breaks
+            away, rad.
+        bristle_relaxation: damping of the bristles over their stiffness, s.
+    """
+
+    torque_constant: float = 5e-6
+    area_ratio: float = 0.95
+    dead_volume: float = 12e-6
+    fill_conductance: float = 0.077e-8
+    exhaust_conductance: float = 0.028e-8
+    leak_conductance: float = 0.0
+    critical_ratio: float = 0.3
+    underlap: float = 0.02
+    valve_lag: float = 0.016
+    dead_time: float = 0.015
+    regulator_gain: float = 9.6e-6
+    coulomb_torque: float = 0.075
+    breakaway_torque: float = 0.15
+    stribeck_velocity: float = 0.05
+    bristle_deflection: float = 2e-3
+    bristle_relaxation: float = 2e-3
+
+    def check(self, where: str) -> None:
+        """Raises InputError naming the first field that cannot be."""
+        for field in ("torque_constant", "area_ratio", "dead_volume"):
+            value = getattr(self, field)
+            require_range(f"{where}.{field}", value, 0.0)
+            require(value > 0.0, f"{where}.{field}", value, "a number above 0")
+        for field in (
+            "fill_conductance",
+            "exhaust_conductance",
+            "leak_conductance",
+            "regulator_gain",
+            "coulomb_torque",
+            "bristle_relaxation",
+        ):
+            require_range(f"{where}.{field}", getattr(self, field), 0.0)
+        require_range(f"{where}.critical_ratio", self.critical_ratio, 0.0, 0.99)
+        require_range(f"{where}.underlap", self.underlap, -0.9, 0.9)
+        require_range(f"{where}.valve_lag", self.valve_lag, 0.0, 1.0)
+        require_range(f"{where}.dead_time", self.dead_time, 0.0, 1.0)
+        require_range(
+            f"{where}.breakaway_torque",
+            self.breakaway_torque,
+            self.coulomb_torque,
+        )
+        require_range(
+            f"{where}.stribeck_velocity", self.stribeck_velocity, 1e-4
+        )
+        require_range(
+            f"{where}.bristle_deflection", self.bristle_deflection, 1e-6, 0.1
+        )
+
+
+_CLASS_FIELDS = tuple(f.name for f in dataclasses.fields(ActuatorClass))
+
+
+@dataclasses.dataclass
+class JointActuator:
+    """Which actuator class drives a joint, and where the joint differs.
+
+    Args:
+        actuator: name of the class.
+        override: values of `ActuatorClass` fields that hold for this joint
+            alone.
+    """
+
+    actuator: str = ""
+    override: dict[str, float] = dataclasses.field(default_factory=dict)
+
+
+@dataclasses.dataclass
+class PneumaticParameters:
+    """The air supply, the actuator classes and the joints they drive.
+
+    Args:
+        supply_pressure: Pa absolute.
+        atmospheric_pressure: Pa absolute.
+        temperature: of supply and surroundings, K.
+        polytropic_exponent: of the air in the chambers, 1 (isothermal) to 1.4
+            (adiabatic).
+        classes: actuator classes by name.
+        joints: the actuator of each joint by the joint's name.
+    """
+
+    supply_pressure: float = 659.3e3
+    atmospheric_pressure: float = 101.3e3
+    temperature: float = 293.15
+    polytropic_exponent: float = 1.2
+    classes: dict[str, ActuatorClass] = dataclasses.field(default_factory=dict)
+    joints: dict[str, JointActuator] = dataclasses.field(default_factory=dict)
+
+    def check(self, where: str) -> None:
+        """Raises InputError naming the first field that cannot be."""
+        require_range(
+            f"{where}.atmospheric_pressure", self.atmospheric_pressure, 1e4, 2e5
+        )
+        require_range(
+            f"{where}.supply_pressure",
+            self.supply_pressure,
+            self.atmospheric_pressure,
+            2e6,
+        )
+        require_range(f"{where}.temperature", self.temperature, 200.0, 400.0)
+        require_range(
+            f"{where}.polytropic_exponent", self.polytropic_exponent, 1.0, 1.4
+        )
+        for name, actuator in self.classes.items():
+            actuator.check(f"{where}.classes.{name}")
+        for name, joint in self.joints.items():
+            self._resolved(name, joint, f"{where}.joints.{name}")
+
+    def actuator_of(self, name: str) -> ActuatorClass:
+        """The actuator of the joint `name`, its overrides applied.
+
+        Raises:
+            InputError: for a joint or a class that is not there, or an
+                override that does not fit.
+        """
+        if name not in self.joints:
+            known = ", ".join(self.joints) or "none"
+            raise InputError(f"no actuator for joint {name!r}; known: {known}")
+        return self._resolved(name, self.joints[name], f"joints.{name}")
+
+    def _resolved(
+        self, name: str, joint: JointActuator, where: str
+    ) -> ActuatorClass:
+        require(
+            joint.actuator in self.classes,
+            f"{where}.actuator",
+            joint.actuator,
+            f"one of {', '.join(self.classes)}",
+        )
+        for field in joint.override:
+            require(
+                field in _CLASS_FIELDS,
+                f"{where}.override",
+                field,
+                f"one of {', '.join(_CLASS_FIELDS)}",
+            )
+        resolved = dataclasses.replace(
+            self.classes[joint.actuator], **joint.override
+        )
+        resolved.check(where)
+        return resolved
+
+    def for_joints(
+        self,
+        names: Sequence[str],
+        q_lower: ArrayLike,
+        q_upper: ArrayLike,
+    ) -> NDArray[np.float64]:
+        """The parameter array of the compiled kernel.
+
+        Args:
+            names: joint names (n).
+            q_lower: lower limits (n), rad.
+            q_upper: upper limits (n), rad.
+
+        Returns:
+            (ROWS, n) array, its rows as in `chamber.Row`.
+
+        Raises:
+            InputError: for an unknown joint or limits that do not fit.
+        """
+        n = len(names)
+        low = np.asarray(q_lower, dtype=float)
+        high = np.asarray(q_upper, dtype=float)
+        require(low.shape == (n,), "q_lower", low, f"{n} angles")
+        require(high.shape == (n,), "q_upper", high, f"{n} angles")
+        require(
+            bool(np.all(np.isfinite(low) & np.isfinite(high) & (low < high))),
+            "q_lower, q_upper",
+            (low, high),
+            "finite limits, each lower one below its upper one",
+        )
+        array = np.empty((ROWS, n))
+        for i, name in enumerate(names):
+            actuator = self.actuator_of(name)
+            array[:, i] = self._column(actuator, low[i], high[i])
+        return array
+
+    def _column(
+        self, actuator: ActuatorClass, q_lower: float, q_upper: float
+    ) -> NDArray[np.float64]:
+        stiffness = actuator.breakaway_torque / actuator.bristle_deflection
+        values = {
+            Row.Q_LOWER: q_lower,
+            Row.Q_UPPER: q_upper,
+            Row.K_A: actuator.torque_constant,
+            Row.K_B: actuator.torque_constant * actuator.area_ratio,
+            Row.V_A: actuator.dead_volume,
+            Row.V_B: actuator.dead_volume,
+            Row.C_FILL: actuator.fill_conductance,
+            Row.C_EXHAUST: actuator.exhaust_conductance,
+            Row.C_LEAK: actuator.leak_conductance,
+            Row.CRITICAL_RATIO: actuator.critical_ratio,
+            Row.UNDERLAP: actuator.underlap,
+            Row.VALVE_LAG: actuator.valve_lag,
+            Row.DEAD_TIME: actuator.dead_time,
+            Row.REGULATOR_GAIN: actuator.regulator_gain,
+            Row.COULOMB: actuator.coulomb_torque,
+            Row.BREAKAWAY: actuator.breakaway_torque,
+            Row.STRIBECK_VELOCITY: actuator.stribeck_velocity,
+            Row.STIFFNESS: stiffness,
+            Row.DAMPING: stiffness * actuator.bristle_relaxation,
+            Row.SUPPLY: self.supply_pressure,
+            Row.ATMOSPHERE: self.atmospheric_pressure,
+            Row.TEMPERATURE: self.temperature,
+            Row.EXPONENT: self.polytropic_exponent,
+        }
+        return np.array([values[row] for row in Row])
+
+
+def load_parameters(
+    file: str | Path = DEFAULT_FILE, overlays: Sequence[str | Path] = ()
+) -> PneumaticParameters:
+    """Reads the actuators' parameters.
+
+    Args:
+        file: a YAML file of `PneumaticParameters`, or its package:// URI.
+        overlays: further such files, each holding only what it changes (for
+            instance a fit to a robot's logs).
+
+    Raises:
+        InputError: for a file or a value that does not fit, by name.
+    """
+    # Drake's YAML reader is behind this; the mathematics need none of it.
+    from drake_affetto.yaml_config import read_yaml, typed
+
+    parameters = PneumaticParameters()
+    for item in (file, *overlays):
+        path = resolve(item)
+        parameters = typed(
+            PneumaticParameters,
+            read_yaml(path),
+            where=path.name,
+            defaults=parameters,
+        )
+    parameters.check(Path(str(file)).name)
+    return parameters
+
+
+def resting_pressure(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The pressure at which a chamber stays with its valve at rest.
+
+    It is the one at which the underlapped edges and the leak pass as much air
+    out as in, the mean pressure of the joint in flow mode.
+
+    Args:
+        parameters: (ROWS, n), see `chamber.Row`.
+
+    Returns:
+        (n) Pa absolute. With the valve closed at rest and no leak any pressure
+        stays: half of the supply's gauge pressure is returned then.
+    """
+    result = np.empty(parameters.shape[1])
+    for i, column in enumerate(parameters.T):
+        supply = column[Row.SUPPLY]
+        atmosphere = column[Row.ATMOSPHERE]
+        temperature = column[Row.TEMPERATURE]
+        fraction = opening_fraction(0.0, column[Row.UNDERLAP])
+        fill = column[Row.C_FILL] * fraction
+        out = column[Row.C_EXHAUST] * fraction + column[Row.C_LEAK]
+        low, high = atmosphere, supply
+        if fill == 0.0 and out == 0.0:
+            result[i] = 0.5 * (low + high)
+            continue
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            mdot_in, mdot_out, _, _ = chamber_flows(
+                middle,
+                temperature,
+                supply,
+                atmosphere,
+                temperature,
+                fill,
+                out,
+                column[Row.CRITICAL_RATIO],
+            )
+            if mdot_in > mdot_out:
+                low = middle
+            else:
+                high = middle
+        result[i] = 0.5 * (low + high)
+    return result
+
+
+def chamber_volumes(
+    parameters: NDArray[np.float64], q: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Volumes (n) of the chambers a and b [m³] at the joint angles q [rad]."""
+    q = np.asarray(q, dtype=float)
+    volume_a = parameters[Row.V_A] + parameters[Row.K_A] * (
+        q - parameters[Row.Q_LOWER]
+    )
+    volume_b = parameters[Row.V_B] + parameters[Row.K_B] * (
+        parameters[Row.Q_UPPER] - q
+    )
+    return volume_a, volume_b
+
+
+def closed_stiffness(
+    parameters: NDArray[np.float64], q: ArrayLike, pressure: ArrayLike
+) -> NDArray[np.float64]:
+    """Rotational stiffness of joints whose valves are shut, N m/rad.
+
+    Σ n p K²/V over both chambers, the rotational form of n p A²/V.
+
+    Args:
+        parameters: (ROWS, n), see `chamber.Row`.
+        q: joint angles (n), rad.
+        pressure: (2n) [p_a; p_b], Pa absolute.
+    """
+    n = parameters.shape[1]
+    p = np.asarray(pressure, dtype=float)
+    volume_a, volume_b = chamber_volumes(parameters, q)
+    return parameters[Row.EXPONENT] * (
+        p[:n] * parameters[Row.K_A] ** 2 / volume_a
+        + p[n:] * parameters[Row.K_B] ** 2 / volume_b
+    )
+
+
+def largest_dead_time(parameters: NDArray[np.float64]) -> float:
+    """The longest dead time [s] among the joints of a parameter array."""
+    longest = float(np.max(parameters[Row.DEAD_TIME], initial=0.0))
+    return longest if math.isfinite(longest) else 0.0
