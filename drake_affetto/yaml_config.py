@@ -110,8 +110,10 @@ def _refuse_unknown(data: Any, schema: Any, where: str) -> None:
             continue
         if key not in fields:
             near = difflib.get_close_matches(str(key), fields, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else (
-                f"known are {', '.join(fields)}"
+            hint = (
+                f"did you mean {near[0]!r}?"
+                if near
+                else (f"known are {', '.join(fields)}")
             )
             raise InputError(f"{where} has no field {key!r}; {hint}")
         _refuse_unknown(item, fields[key], f"{where}.{key}")
