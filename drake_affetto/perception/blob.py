@@ -120,7 +120,7 @@ class BlobConfig:
     """
 
     color: list[float] = dataclasses.field(
-        default_factory=lambda: [0.85, 0.10, 0.45]
+        default_factory=lambda: [0.05, 0.75, 0.15]
     )
     hue_tolerance: float = 24.0
     chroma: float = 0.4

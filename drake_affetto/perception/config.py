@@ -19,6 +19,10 @@ from drake_affetto.perception.optics import (
 )
 
 
+# Beyond it a pinhole's image of a wide-angle view is far too large.
+_MAX_ANGLE = 1.3
+
+
 def _zeros() -> list[float]:
     return [0.0, 0.0, 0.0]
 
@@ -79,8 +83,7 @@ class CameraConfig:
             frame's z looks forward, the third one rolls the image.
         width: image width [pixels].
         height: image height [pixels].
-        fov_y: vertical field of view [rad] of the pinhole; with a lens, the
-            focal length is that of the pinhole of this field of view.
+        fov_y: vertical field of view [rad], with the lens if there is one.
         lens: a wide-angle lens; none is a pinhole.
         near: nearest depth [m] that is rendered.
         far: farthest depth [m] that is rendered.
@@ -99,7 +102,7 @@ class CameraConfig:
     height: int = 240
     fov_y: float = 0.9
     lens: LensConfig | None = None
-    near: float = 0.02
+    near: float = 0.05
     far: float = 5.0
     rate: float = 10.0
     latency: float = 0.05
@@ -119,6 +122,14 @@ class CameraConfig:
         require_range(f"{where}.latency", self.latency, 0.0, 1.0)
         if self.lens is not None:
             self.lens.check(f"{where}.lens")
+            corner = self.model().direction(np.array([-0.5, -0.5]))
+            require(
+                bool(corner[2] > math.cos(_MAX_ANGLE)),
+                f"{where}.fov_y",
+                self.fov_y,
+                f"less: the image's corners may be {_MAX_ANGLE:g} rad off the "
+                "axis, as the lens is made from a pinhole's image",
+            )
         effects = f"{where}.effects"
         require_range(f"{effects}.exposure", self.effects.exposure, -6, 6)
         require_vector(
@@ -141,18 +152,10 @@ class CameraConfig:
 
     def model(self) -> Camera:
         """The camera's geometry."""
-        pinhole = PinholeCamera.from_fov(self.width, self.height, self.fov_y)
         if self.lens is None:
-            return pinhole
-        return FisheyeCamera(
-            pinhole.width,
-            pinhole.height,
-            pinhole.focal_x,
-            pinhole.focal_y,
-            pinhole.center_x,
-            pinhole.center_y,
-            self.lens.k1,
-            self.lens.k2,
+            return PinholeCamera.from_fov(self.width, self.height, self.fov_y)
+        return FisheyeCamera.from_fov(
+            self.width, self.height, self.fov_y, self.lens.k1, self.lens.k2
         )
 
     def X_FC(self) -> np.ndarray:
@@ -176,8 +179,8 @@ class MirrorConfig:
     """
 
     frame: str = "mirror::mirror"
-    width: float = 0.3
-    height: float = 0.3
+    width: float = 0.42
+    height: float = 0.34
     tint: list[float] = dataclasses.field(default_factory=_ones)
     blur: float = 0.0
 

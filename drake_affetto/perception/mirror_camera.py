@@ -271,6 +271,7 @@ class MirrorCamera(LeafSystem):
         """The geometry of the image that the ports give."""
         return self._model
 
+    @property
     def camera_info(self) -> CameraInfo:
         """Drake's description of the camera (of its pinhole, if fisheye)."""
         return _camera_info(self._pinhole)

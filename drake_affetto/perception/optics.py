@@ -132,6 +132,26 @@ class FisheyeCamera:
     k1: float = 0.0
     k2: float = 0.0
 
+    @classmethod
+    def from_fov(
+        cls,
+        width: int,
+        height: int,
+        fov_y: float,
+        k1: float = 0.0,
+        k2: float = 0.0,
+    ) -> "FisheyeCamera":
+        """Square pixels and a central principal point; fov_y in rad."""
+        unit = cls(width, height, 1.0, 1.0, 0.0, 0.0, k1, k2)
+        focal = 0.5 * height / float(unit._radius(np.array(0.5 * fov_y)))
+        return dataclasses.replace(
+            unit,
+            focal_x=focal,
+            focal_y=focal,
+            center_x=0.5 * width,
+            center_y=0.5 * height,
+        )
+
     @property
     def image_center(self) -> Array:
         """Pixel coordinates (2,) of the middle of the image."""

@@ -10,6 +10,8 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import FixedOffsetFrame
 
 MARKER_RADIUS = 0.025
+MARKER_COLOR = [0.85, 0.10, 0.45]
+_MARKER_RGB = " ".join(map(str, MARKER_COLOR))
 MIRROR_SIZE = (0.42, 0.36)
 CAMERA_SDF = """
 <sdf version='1.8'><model name='robot'>
@@ -42,10 +44,10 @@ DRUM_SDF = f"""
   <visual name='shell'><pose>0 0 .035 0 0 0</pose><geometry><cylinder>
     <radius>.065</radius><length>.07</length></cylinder></geometry>
     <material><diffuse>.85 .85 .8 1</diffuse></material></visual>
-  <visual name='marker'><pose>0 0 .071 0 0 0</pose><geometry><cylinder>
-    <radius>{MARKER_RADIUS}</radius><length>.002</length></cylinder></geometry>
-    <material><diffuse>.85 .1 .45 1</diffuse></material></visual>
-  </link><frame name='marker' attached_to='shell'><pose>0 0 .072 0 0 0</pose>
+  <visual name='marker'><pose>0 0 .0703 0 0 0</pose><geometry><cylinder>
+    <radius>{MARKER_RADIUS}</radius><length>.0006</length></cylinder></geometry>
+    <material><diffuse>{_MARKER_RGB} 1</diffuse></material></visual>
+  </link><frame name='marker' attached_to='shell'><pose>0 0 .0706 0 0 0</pose>
   </frame></model></sdf>"""
 TABLE_SDF = """
 <sdf version='1.8'><model name='table'><static>true</static>

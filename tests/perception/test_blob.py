@@ -1,0 +1,188 @@
+"""Finding the marker in drawn images whose truth is known exactly."""
+
+import numpy as np
+import pytest
+
+from drake_affetto.errors import InputError
+from drake_affetto.perception.blob import (
+    BlobCalibration,
+    BlobConfig,
+    calibrate,
+    detect,
+    find_candidates,
+    marker_lab,
+    segment,
+)
+from drake_affetto.perception.imaging import ImageEffects, apply_effects
+
+MARKER = (13, 191, 38)
+TABLE = (168, 117, 71)
+
+
+def draw_disc(
+    u, v, radius, *, shape=(240, 320), squeeze=1.0, color=MARKER, image=None
+):
+    """A disc (or ellipse) with edges covered in part, by supersampling."""
+    if image is None:
+        image = np.empty((*shape, 3), dtype=np.uint8)
+        image[:] = TABLE
+    n = 8
+    offset = (np.arange(n) + 0.5) / n - 0.5
+    y, x = np.mgrid[: image.shape[0], : image.shape[1]]
+    cover = np.zeros(image.shape[:2])
+    for dy in offset:
+        for dx in offset:
+            cover += (x + dx - u) ** 2 + ((y + dy - v) / squeeze) ** 2 <= (
+                radius**2
+            )
+    cover = cover[:, :, None] / n**2
+    mixed = cover * np.array(color) + (1 - cover) * image
+    return np.rint(mixed).astype(np.uint8)
+
+
+@pytest.mark.parametrize("detector", ["moments", "simple"])
+@pytest.mark.parametrize("radius", [3.0, 6.0, 15.0])
+def test_centroid_is_found_to_a_fraction_of_a_pixel(radius, detector):
+    config = BlobConfig(detector=detector)
+    rng = np.random.default_rng(3)
+    errors = []
+    for _ in range(8):
+        u, v = rng.uniform([30, 30], [290, 210])
+        blob = detect(draw_disc(u, v, radius, squeeze=0.7), config)
+        assert blob is not None
+        errors.append(np.hypot(blob.u - u, blob.v - v))
+        if detector == "moments":
+            expected = 0.7 * np.pi * radius**2
+            assert blob.area == pytest.approx(expected, rel=0.08)
+    assert max(errors) < (0.1 if detector == "moments" else 0.5)
+
+
+def test_alpha_channel_is_ignored():
+    image = draw_disc(100.3, 80.7, 8)
+    rgba = np.dstack([image, np.full(image.shape[:2], 255, np.uint8)])
+    assert detect(image, BlobConfig()) == detect(rgba, BlobConfig())
+
+
+def test_no_marker_is_not_found():
+    config = BlobConfig()
+    rng = np.random.default_rng(0)
+    # Images of any other colours: the marker's hue left out by construction.
+    for _ in range(40):
+        colors = rng.integers(0, 256, (6, 8, 3), dtype=np.uint8)
+        _, chroma, hue = np.vectorize(
+            lambda r, g, b: marker_lab([r / 255, g / 255, b / 255])
+        )(*np.moveaxis(colors, 2, 0))
+        apart = np.abs(
+            (hue - marker_lab(config.color)[2] + np.pi) % (2 * np.pi) - np.pi
+        )
+        colors[(np.degrees(apart) < 30) & (chroma > 15)] = (128, 128, 128)
+        image = np.kron(colors, np.ones((40, 40, 1), dtype=np.uint8))
+        image = apply_effects(image, ImageEffects(noise=4.0), time=0.1)
+        assert detect(image, config) is None
+
+
+def test_shapes_that_are_no_disc_are_refused():
+    image = np.empty((240, 320, 3), dtype=np.uint8)
+    image[:] = TABLE
+    line = image.copy()
+    line[100:102, 50:250] = MARKER
+    assert detect(line, BlobConfig()) is None
+    ring = draw_disc(160, 120, 30)
+    ring = draw_disc(160, 120, 22, image=ring, color=TABLE)
+    assert detect(ring, BlobConfig()) is None
+    speck = image.copy()
+    speck[100:102, 50:52] = MARKER
+    assert detect(speck, BlobConfig()) is None
+
+
+def test_distractors_of_other_colours_and_shapes_do_not_matter():
+    image = draw_disc(100.0, 80.0, 9, color=(200, 40, 30))
+    image = draw_disc(220.0, 80.0, 20, color=(40, 60, 200), image=image)
+    image = draw_disc(60.0, 180.0, 12, color=(230, 210, 40), image=image)
+    image[200:204, 20:300] = MARKER
+    image = draw_disc(250.25, 170.75, 8, image=image)
+    blob = detect(image, BlobConfig())
+    assert blob is not None
+    assert np.hypot(blob.u - 250.25, blob.v - 170.75) < 0.1
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        ImageEffects(exposure=1.0),
+        ImageEffects(exposure=-1.0),
+        ImageEffects(white_balance=[1.25, 1.0, 0.7]),
+        ImageEffects(white_balance=[0.8, 1.0, 1.25]),
+        ImageEffects(noise=8.0),
+        ImageEffects(motion_blur=[6.0, 2.0]),
+    ],
+    ids=["bright", "dark", "warm", "cool", "noise", "blur"],
+)
+def test_light_noise_and_blur_are_borne(effects):
+    image = apply_effects(draw_disc(140.4, 90.2, 7), effects, time=1.0)
+    blob = detect(image, BlobConfig())
+    assert blob is not None
+    assert np.hypot(blob.u - 140.4, blob.v - 90.2) < 0.35
+
+
+def test_region_limits_the_search_and_keeps_coordinates():
+    image = draw_disc(60.0, 60.0, 12)
+    image = draw_disc(250.0, 180.0, 6, image=image)
+    whole = detect(image, BlobConfig())
+    assert whole is not None
+    assert whole.u == pytest.approx(60.0, abs=0.1)
+    right = detect(image, BlobConfig(region=[0.5, 0.5, 1.0, 1.0]))
+    assert right is not None
+    np.testing.assert_allclose([right.u, right.v], [250, 180], atol=0.1)
+
+
+def test_coarse_gate_loses_nothing():
+    """What the gate in Lab keeps lies in the rectangle of candidates."""
+    import cv2
+
+    rng = np.random.default_rng(5)
+    config = BlobConfig()
+    for _ in range(30):
+        colors = rng.integers(0, 256, (12, 16, 3), dtype=np.uint8)
+        image = np.kron(colors, np.ones((20, 20, 1), dtype=np.uint8))
+        mask = segment(cv2.cvtColor(image, cv2.COLOR_RGB2Lab), config)
+        box = find_candidates(image, config)
+        v, u = np.nonzero(mask)
+        if len(u) == 0:
+            continue
+        assert box is not None
+        assert u.min() >= box[0]
+        assert v.min() >= box[1]
+        assert u.max() < box[2]
+        assert v.max() < box[3]
+
+
+def test_calibration_and_its_inverse():
+    box = BlobCalibration(20.0, 220.0, 40.0, 140.0)
+    xy = box.normalise([[20, 40], [220, 140], [120, 90]])
+    np.testing.assert_allclose(xy, [[0, 0], [1, 1], [0.5, 0.5]])
+    np.testing.assert_allclose(
+        box.pixels(xy), [[20, 40], [220, 140], [120, 90]]
+    )
+
+
+def test_calibrate_holds_the_workspace_with_a_margin():
+    uv = np.array([[50, 60], [150, 60], [100, 160], [np.nan, 3], [50, 160]])
+    box = calibrate(uv, margin=0.1)
+    np.testing.assert_allclose(box.to_vector(), [40, 160, 50, 170])
+    direct = calibrate(uv, margin=0.1, image_width=320)
+    np.testing.assert_allclose(direct.to_vector(), [-0.5, 319.5, 50, 170])
+
+
+def test_bad_settings_are_named():
+    with pytest.raises(InputError, match="seen at 1 of 2"):
+        calibrate(np.array([[np.nan, 1.0], [2.0, 3.0]]))
+    for config, field in (
+        (BlobConfig(color=[0.5, 0.5, 0.5]), "color"),
+        (BlobConfig(region=[0.5, 0.0, 0.4, 1.0]), "region"),
+        (BlobConfig(detector="guess"), "detector"),
+        (BlobConfig(min_area=-1), "min_area"),
+        (BlobConfig(calibration=BlobCalibration(5, 5, 0, 9)), "u_max"),
+    ):
+        with pytest.raises(InputError, match=f"blob.*{field}"):
+            config.check("blob")
