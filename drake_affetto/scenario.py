@@ -119,6 +119,8 @@ class Scenario:
     Attributes:
         random_seed: seed of whatever is random in a simulation.
         simulation_duration: s, of a trial that nobody stops earlier.
+        settling_duration: s, in which the robot comes to rest at its start
+            posture before the first trial.
         simulator_config: Drake's own.
         plant_config: Drake's own; its time step is also the actuators'.
         world: models, the drum's default place, and the robot's posture: of
@@ -144,6 +146,7 @@ class Scenario:
 
     random_seed: int = 0
     simulation_duration: float = 8.0
+    settling_duration: float = 2.0
     simulator_config: SimulatorConfig = dataclasses.field(
         default_factory=SimulatorConfig
     )
@@ -201,6 +204,9 @@ class Scenario:
         require_range(f"{where}.random_seed", self.random_seed, 0, 2**31 - 1)
         require_range(
             f"{where}.simulation_duration", self.simulation_duration, 0, 3600
+        )
+        require_range(
+            f"{where}.settling_duration", self.settling_duration, 0.1, 60
         )
         require_range(
             f"{where}.plant_config.time_step",

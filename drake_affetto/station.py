@@ -221,6 +221,11 @@ class AffettoStation(Diagram):
             self.plant, self._sub(self.plant, context)
         )
 
+    def touching_position(self, context: Context) -> np.ndarray:
+        """Where the palm is as the hand just touches the head's middle, (3,)."""
+        radius = world.hand_radius(self.plant, self._sub(self.plant, context))
+        return self.head_center_position(context) + [0.0, 0.0, radius]
+
     def camera_pose(self, context: Context) -> RigidTransform:
         """X_WC; C looks along z, with x to the right and y down."""
         return self.camera.camera_pose(self._sub(self.camera, context))

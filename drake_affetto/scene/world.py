@@ -10,7 +10,13 @@ import dataclasses
 import difflib
 
 import numpy as np
-from pydrake.geometry import Box, Cylinder, Role, SceneGraphInspector
+from pydrake.geometry import (
+    Box,
+    Cylinder,
+    Role,
+    SceneGraphInspector,
+    Sphere,
+)
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
@@ -334,6 +340,13 @@ def drum_radius(plant: MultibodyPlant, context: Context) -> float:
     """Radius [m] of the drum's shell, its widest part."""
     body = plant.GetBodyByName("shell")
     shapes = _collision_shapes(plant, context, body, Cylinder)
+    return max(shape.radius() for _, shape in shapes)
+
+
+def hand_radius(plant: MultibodyPlant, context: Context) -> float:
+    """Radius [m] of the soft right hand, about the palm's frame."""
+    body = plant.GetBodyByName("right_hand")
+    shapes = _collision_shapes(plant, context, body, Sphere)
     return max(shape.radius() for _, shape in shapes)
 
 
