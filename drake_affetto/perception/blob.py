@@ -9,6 +9,7 @@ of the pixels.
 import dataclasses
 import functools
 import math
+from typing import Any
 
 import cv2
 import numpy as np
@@ -414,7 +415,8 @@ def _simple_blobs(
     lab: Array, mask: Array, config: BlobConfig, image_area: int
 ) -> list[Blob]:
     """OpenCV's SimpleBlobDetector on the mask."""
-    params = cv2.SimpleBlobDetector_Params()
+    module: Any = cv2
+    params = module.SimpleBlobDetector_Params()
     params.minThreshold, params.maxThreshold = 100, 156
     params.thresholdStep, params.minRepeatability = 50, 1
     params.filterByColor, params.blobColor = True, 255
@@ -426,9 +428,10 @@ def _simple_blobs(
     params.minInertiaRatio = 1.0 / config.max_aspect**2
     params.filterByConvexity = True
     params.minConvexity = config.min_fill
-    keypoints = cv2.SimpleBlobDetector_create(params).detect(mask)
+    keypoints = module.SimpleBlobDetector_create(params).detect(mask)
     blobs = []
     for keypoint in keypoints:
         area = math.pi * (0.5 * keypoint.size) ** 2
-        blobs.append(Blob(*keypoint.pt, area, min(1.0, area / 25.0)))
+        u, v = keypoint.pt
+        blobs.append(Blob(u, v, area, min(1.0, area / 25.0)))
     return blobs

@@ -81,7 +81,9 @@ class BlobSensor(LeafSystem):
         config: BlobConfig | None = None,
     ) -> "BlobSensor":
         """Adds a sensor that looks at `color_image`."""
-        sensor = builder.AddNamedSystem("blob_sensor", BlobSensor(config))
+        sensor = BlobSensor(config)
+        sensor.set_name("blob_sensor")
+        builder.AddSystem(sensor)
         builder.Connect(color_image, sensor.get_color_image_input_port())
         return sensor
 
@@ -113,8 +115,9 @@ class BlobSensor(LeafSystem):
             self._calibration_index
         ).SetFromVector(calibration.to_vector())
 
-    def _calc_detection(self, context: Context, cache: Any) -> None:
-        blob = detect(self._image_port.Eval(context).data, self._config)
+    def _calc_detection(self, context: Any, cache: Any) -> None:
+        image: Any = self._image_port.Eval(context)
+        blob = detect(image.data, self._config)
         cache.set_value(
             np.zeros(4)
             if blob is None
@@ -122,12 +125,13 @@ class BlobSensor(LeafSystem):
         )
 
     def _calc_blob(self, context: Context, output: BasicVector) -> None:
-        pixels = self._pixels_cache.Eval(context)
+        pixels: Any = self._pixels_cache.Eval(context)
         if pixels[2] <= 0.0:
-            output.SetFromVector([LOST, LOST, 0.0])
+            output.SetFromVector(np.array([LOST, LOST, 0.0]))
             return
         x, y = self.calibration(context).normalise(pixels[:2])
-        output.SetFromVector([x, y, 1.0])
+        output.SetFromVector(np.array([x, y, 1.0]))
 
     def _calc_pixels(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._pixels_cache.Eval(context))
+        pixels: Any = self._pixels_cache.Eval(context)
+        output.SetFromVector(pixels)

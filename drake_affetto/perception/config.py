@@ -18,7 +18,6 @@ from drake_affetto.perception.optics import (
     make_pose,
 )
 
-
 # Beyond it a pinhole's image of a wide-angle view is far too large.
 _MAX_ANGLE = 1.3
 

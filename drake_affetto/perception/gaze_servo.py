@@ -1,6 +1,7 @@
 """The system that turns the upper body to the marker and takes τ."""
 
 import math
+from typing import Any
 
 import numpy as np
 from pydrake.systems.framework import (
@@ -166,17 +167,11 @@ class GazeServo(LeafSystem):
         latency: float = 0.0,
     ) -> "GazeServo":
         """Adds a servo wired to a blob sensor and to the joints' state."""
-        servo = builder.AddNamedSystem(
-            "gaze_servo",
-            GazeServo(
-                estimated_state.size() // 2,
-                yaw_index,
-                view,
-                config,
-                rate,
-                latency,
-            ),
+        servo = GazeServo(
+            estimated_state.size() // 2, yaw_index, view, config, rate, latency
         )
+        servo.set_name("gaze_servo")
+        builder.AddSystem(servo)
         builder.Connect(blob, servo.get_blob_input_port())
         builder.Connect(estimated_state, servo.get_estimated_state_input_port())
         return servo
@@ -254,8 +249,9 @@ class GazeServo(LeafSystem):
 
     def _measure(self, context: Context) -> np.ndarray:
         """One image as a row: time, x_img, y_img, found, yaw."""
-        blob = self._blob_port.Eval(context)
-        yaw = self._state_port.Eval(context)[self._yaw_index]
+        blob: Any = self._blob_port.Eval(context)
+        state: Any = self._state_port.Eval(context)
+        yaw = state[self._yaw_index]
         return np.array([context.get_time(), *blob, yaw])
 
     def _take_in(
@@ -303,28 +299,28 @@ class GazeServo(LeafSystem):
     def _calc_yaw_command(self, context: Context, output: BasicVector) -> None:
         x = self._gaze_values(context)
         yaw = self._gaze.yaw_command(x, context.get_time(), self.task(context))
-        output.SetFromVector([yaw])
+        output.SetFromVector(np.array([yaw]))
 
     def _calc_task_parameter(
         self, context: Context, output: BasicVector
     ) -> None:
         x = self._gaze_values(context)
         if self._gaze.is_settled(x, self.task(context)):
-            output.SetFromVector([x[TAU_1], x[TAU_2]])
+            output.SetFromVector(np.array([x[TAU_1], x[TAU_2]]))
         else:
-            output.SetFromVector([0.0, 0.0])
+            output.SetFromVector(np.array([0.0, 0.0]))
 
     def _calc_settled(self, context: Context, output: BasicVector) -> None:
         x = self._gaze_values(context)
         settled = self._gaze.is_settled(x, self.task(context))
-        output.SetFromVector([float(settled)])
+        output.SetFromVector(np.array([float(settled)]))
 
     def _calc_failed(self, context: Context, output: BasicVector) -> None:
         x = self._gaze_values(context)
         failed = self._gaze.is_failed(x, self.task(context))
-        output.SetFromVector([float(failed)])
+        output.SetFromVector(np.array([float(failed)]))
 
     def _calc_ready(self, context: Context, output: BasicVector) -> None:
         x = self._gaze_values(context)
         ready = self._gaze.is_ready(x, context.get_time(), self.task(context))
-        output.SetFromVector([float(ready)])
+        output.SetFromVector(np.array([float(ready)]))

@@ -75,7 +75,7 @@ def add_renderers(scene_graph: SceneGraph, config: RenderConfig) -> None:
             frame="world",
             position=np.asarray(light.position, dtype=float),
             direction=np.asarray(light.direction, dtype=float),
-            color=Rgba(*light.color, 1.0),
+            color=Rgba(light.color[0], light.color[1], light.color[2], 1.0),
             intensity=light.intensity,
             cone_angle=light.cone_angle,
         )
@@ -167,7 +167,6 @@ class MirrorCamera(LeafSystem):
         if isinstance(self._model, FisheyeCamera):
             self._remap = self._model.remap_grid()
         self._noise_bank = NoiseBank()
-        self._clipping = (config.near, config.far)
 
         camera_frame = find_frame(plant, config.frame)
         self._camera_id = _frame_id(plant, camera_frame)
@@ -185,7 +184,7 @@ class MirrorCamera(LeafSystem):
         effects = self.DeclareNumericParameter(
             BasicVector(config.effects.to_vector())
         )
-        seed = self.DeclareNumericParameter(BasicVector([0.0]))
+        seed = self.DeclareNumericParameter(BasicVector(np.zeros(1)))
         self._effects_index, self._seed_index = int(effects), int(seed)
 
         self._query_port = self.DeclareAbstractInputPort(
@@ -236,9 +235,9 @@ class MirrorCamera(LeafSystem):
     ) -> "MirrorCamera":
         """Adds a camera, and the renderers it needs, wired to the scene."""
         add_renderers(scene_graph, render_config or RenderConfig())
-        camera = builder.AddNamedSystem(
-            "camera", MirrorCamera(plant, config, mirrors)
-        )
+        camera = MirrorCamera(plant, config, mirrors)
+        camera.set_name("camera")
+        builder.AddSystem(camera)
         builder.Connect(
             scene_graph.get_query_output_port(),
             camera.get_query_object_input_port(),
@@ -309,7 +308,7 @@ class MirrorCamera(LeafSystem):
     def set_seed(self, context: Context, seed: int) -> None:
         """Sets the seed of the sensor noise (an integer from 0 on)."""
         context.get_mutable_numeric_parameter(self._seed_index).SetFromVector(
-            [float(seed)]
+            np.array([float(seed)])
         )
 
     def set_camera_pose_in_body(
@@ -327,41 +326,53 @@ class MirrorCamera(LeafSystem):
     # Calculations
 
     def _query(self, context: Context) -> QueryObject:
-        return self._query_port.Eval(context)
+        query: Any = self._query_port.Eval(context)
+        return query
 
     def _X_WC(self, context: Context, query: QueryObject) -> np.ndarray:
         X_WB = query.GetPoseInWorld(self._camera_id)
-        X_BC = context.get_abstract_parameter(0).get_value()
+        parameter: Any = context.get_abstract_parameter(0)
+        X_BC: RigidTransform = parameter.get_value()
         return (X_WB @ X_BC).GetAsMatrix4()
 
     def _X_WM(
         self, context: Context, query: QueryObject, index: int
     ) -> np.ndarray:
         X_WB = query.GetPoseInWorld(self._mirror_ids[index])
-        X_BM = context.get_abstract_parameter(1 + index).get_value()
+        parameter: Any = context.get_abstract_parameter(1 + index)
+        X_BM: RigidTransform = parameter.get_value()
         return (X_WB @ X_BM).GetAsMatrix4()
 
-    def _render_camera(
-        self, renderer: str, camera: PinholeCamera, near: float
-    ) -> ColorRenderCamera:
+    def _render(
+        self,
+        query: Any,
+        renderer: str,
+        camera: PinholeCamera,
+        X_WC: np.ndarray,
+        near: float | None = None,
+        labels: bool = False,
+    ) -> np.ndarray:
+        """One pass: RGBA (h, w, 4) of uint8, or labels (h, w) of int16."""
         core = RenderCameraCore(
             renderer,
             _camera_info(camera),
-            ClippingRange(near, self._clipping[1]),
+            ClippingRange(near or self._config.near, self._config.far),
             RigidTransform(),
         )
-        return ColorRenderCamera(core, False)
+        world = query.inspector().world_frame_id()
+        pass_camera = ColorRenderCamera(core, False)
+        X = RigidTransform(X_WC)
+        if labels:
+            return query.RenderLabelImage(pass_camera, world, X).data[:, :, 0]
+        return query.RenderColorImage(pass_camera, world, X).data
 
-    def _calc_view(self, context: Context, cache: Any) -> None:
+    def _calc_view(self, context: Any, cache: Any) -> None:
         """The ideal pinhole image with its reflections, (h, w, 3)."""
         query = self._query(context)
-        world = query.inspector().world_frame_id()
         X_WC = self._X_WC(context, query)
-        near = self._clipping[0]
-        camera = self._render_camera(DIRECT, self._pinhole, near)
-        rendered = query.RenderColorImage(camera, world, RigidTransform(X_WC))
+        rendered = self._render(query, DIRECT, self._pinhole, X_WC)
         # Drops alpha; the copy is ours to draw the reflections into.
-        image = cv2.cvtColor(rendered.data, cv2.COLOR_RGBA2RGB)
+        image = cv2.cvtColor(rendered, cv2.COLOR_RGBA2RGB)
         for index, mirror in enumerate(self._mirrors):
             X_WM = self._X_WM(context, query, index)
             view = mirror_view(
@@ -370,7 +381,7 @@ class MirrorCamera(LeafSystem):
                 X_WM,
                 mirror.width,
                 mirror.height,
-                near,
+                self._config.near,
                 margin=math.ceil(3 * mirror.blur),
             )
             if view is not None:
@@ -383,20 +394,15 @@ class MirrorCamera(LeafSystem):
 
     def _draw_mirror(
         self,
-        query: QueryObject,
+        query: Any,
         index: int,
         view: MirrorView,
         X_WC: np.ndarray,
         X_WM: np.ndarray,
         image: np.ndarray,
     ) -> None:
-        world = query.inspector().world_frame_id()
         crop = self._pinhole.crop(view.left, view.top, view.width, view.height)
-        labels = query.RenderLabelImage(
-            self._render_camera(DIRECT, crop, self._clipping[0]),
-            world,
-            RigidTransform(X_WC),
-        ).data[:, :, 0]
+        labels = self._render(query, DIRECT, crop, X_WC, labels=True)
         mask = np.zeros(labels.shape, dtype=np.uint8)
         outline = (view.polygon - [view.left, view.top]) * 16
         cv2.fillConvexPoly(
@@ -406,13 +412,11 @@ class MirrorCamera(LeafSystem):
         if not mask.any():
             return  # Something hides the whole mirror.
         # What is nearer than the face is behind the mirror.
-        near = max(self._clipping[0], view.depth)
-        virtual = query.RenderColorImage(
-            self._render_camera(MIRROR, crop.flipped(), near),
-            world,
-            RigidTransform(reflect_camera(X_WC, X_WM)),
+        near = max(self._config.near, view.depth)
+        virtual = self._render(
+            query, MIRROR, crop.flipped(), reflect_camera(X_WC, X_WM), near
         )
-        reflection = cv2.cvtColor(cv2.flip(virtual.data, 1), cv2.COLOR_RGBA2RGB)
+        reflection = cv2.cvtColor(cv2.flip(virtual, 1), cv2.COLOR_RGBA2RGB)
         part = image[
             view.top : view.top + view.height,
             view.left : view.left + view.width,
@@ -420,8 +424,8 @@ class MirrorCamera(LeafSystem):
         mirror = self._mirrors[index]
         composite_mirror(part, reflection, mask, mirror.tint, mirror.blur)
 
-    def _calc_color_image(self, context: Context, output: Any) -> None:
-        image = self._view_cache.Eval(context)
+    def _calc_color_image(self, context: Any, output: Any) -> None:
+        image: Any = self._view_cache.Eval(context)
         if self._remap is not None:
             image = cv2.remap(
                 image,
@@ -438,14 +442,10 @@ class MirrorCamera(LeafSystem):
         data[:, :, :3] = image
         data[:, :, 3] = 255
 
-    def _calc_label_image(self, context: Context, output: Any) -> None:
+    def _calc_label_image(self, context: Any, output: Any) -> None:
         query = self._query(context)
-        rendered = query.RenderLabelImage(
-            self._render_camera(DIRECT, self._pinhole, self._clipping[0]),
-            query.inspector().world_frame_id(),
-            RigidTransform(self._X_WC(context, query)),
-        )
-        labels = rendered.data[:, :, 0]
+        X_WC = self._X_WC(context, query)
+        labels = self._render(query, DIRECT, self._pinhole, X_WC, labels=True)
         if self._remap is not None:
             labels = cv2.remap(
                 labels,
@@ -455,7 +455,7 @@ class MirrorCamera(LeafSystem):
             )
         output.get_mutable_value().mutable_data[:, :, 0] = labels
 
-    def _calc_pose(self, context: Context, output: Any) -> None:
+    def _calc_pose(self, context: Any, output: Any) -> None:
         output.set_value(self.camera_pose(context))
 
 
@@ -469,7 +469,7 @@ def _frame_id(plant: MultibodyPlant, frame: Frame) -> FrameId:
     return frame_id
 
 
-def _labels(query: QueryObject, frame_id: FrameId) -> list[int]:
+def _labels(query: Any, frame_id: FrameId) -> list[int]:
     """The labels that the visible geometry of a body carries."""
     inspector = query.inspector()
     labels = set()
