@@ -1,9 +1,9 @@
 """Draws a Diagram: systems as tables of ports, connections as arrows.
 
 Drake describes a Diagram in Graphviz's language; here the description is made
-readable (no ports that nothing is connected to, a colour for each stage) and
-rendered by the Graphviz library that pygraphviz brings along, so that no `dot`
-program is needed.
+readable (no ports that nothing is connected to, the Diagram's own ports named
+where they are, a colour for each stage) and rendered by the Graphviz library
+that pygraphviz brings along, so that no `dot` program is needed.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ STAGE_COLORS = {
 }
 
 _STYLE = """rankdir=LR
-graph [fontname="Helvetica", fontsize=12, ranksep=0.9, nodesep=0.3]
+graph [fontname="Helvetica", fontsize=12, ranksep=0.6, nodesep=0.3]
 node [fontname="Helvetica", fontsize=11]
 edge [color="#444444", arrowsize=0.7]"""
 
@@ -49,12 +49,12 @@ _NODE = re.compile(
     r"(?P<table><TABLE.*?</TABLE>)\n>\];$",
     re.DOTALL | re.MULTILINE,
 )
-_HEADER = re.compile(
-    r"<TR><TD (?P<attributes>[^>]*)>\s*(?P<text><B>.*?)</TD></TR>", re.DOTALL
-)
+_HEADER = re.compile(r"<TR><TD [^>]*>\s*(?P<text><B>.*?)</TD></TR>", re.DOTALL)
+_CLASS = re.compile(r"<B>(?:\w+\.)*(\w+)")
 _NAME = re.compile(r"^name=(.*)$", re.MULTILINE)
 _PORT = re.compile(r'<TD PORT="(?P<id>[uy]\d+)"[^>]*>(?P<text>.*?)</TD>')
-_EDGE = re.compile(r"^(\w+):(\w+):e -> (\w+):(\w+):w", re.MULTILINE)
+_EDGE = re.compile(r"^(\w+):(\w+):e -> (\w+):(\w+):w.*\n", re.MULTILINE)
+_OWN_PORT = re.compile(r'<TR><TD BORDER="1" PORT="(\d+)">(.*?)</TD></TR>')
 
 
 def graphviz_source(
@@ -75,6 +75,7 @@ def graphviz_source(
     connected = set()
     for start, output, end, input_ in _EDGE.findall(source):
         connected |= {(start, output), (end, input_)}
+    source, exported = _take_out_own_ports(source)
     colors = _stage_colors(system)
     # A block that stands alone has no connections and is its ports.
     keep_all = all_ports or not connected
@@ -87,7 +88,7 @@ def graphviz_source(
         name = _NAME.search(header["text"])
         color = colors.get(html.unescape(name[1]) if name else "", "white")
         ports = [
-            (port["id"], port["text"])
+            (port["id"], port["text"] + exported.get((node, port["id"]), ""))
             for port in _PORT.finditer(table)
             if keep_all or (node, port["id"]) in connected
         ]
@@ -101,7 +102,49 @@ def graphviz_source(
             "</TABLE>\n>];"
         )
 
-    return _NODE.sub(redraw, source).replace("rankdir=LR", _STYLE, 1)
+    source = _NODE.sub(redraw, source)
+    source = _CLASS.sub(r"<B>\1", source)
+    return source.replace("rankdir=LR", _STYLE, 1)
+
+
+def _take_out_own_ports(source: str) -> tuple[str, dict[tuple[str, str], str]]:
+    """Removes the outermost Diagram's own ports, and their arrows.
+
+    They would draw as one long list, with an arrow across the whole picture
+    for each.
+
+    Returns:
+        The source without them, and the words that say so at the port, by
+        node and port.
+    """
+    outermost = re.match(r"digraph _(\d+) ", source)
+    assert outermost is not None
+    words: dict[tuple[str, str], str] = {}
+    for side in ("in", "out"):
+        own = f"s{outermost[1]}{side}"
+        block = re.search(
+            rf"^subgraph cluster{own} {{.*?^}}\n",
+            source,
+            re.DOTALL | re.MULTILINE,
+        )
+        if block is None:
+            continue
+        names = dict(_OWN_PORT.findall(block[0]))
+        source = source.replace(block[0], "", 1)
+        for edge in list(_EDGE.finditer(source)):
+            start, output, end, input_ = edge.groups()
+            if start == own:
+                port, name = (end, input_), f"\N{BULLET} {names[output]}"
+                color = "#1565c0"
+            elif end == own:
+                port, name = (start, output), f"{names[input_]} \N{BULLET}"
+                color = "#2e7d32"
+            else:
+                continue
+            text = f'<BR/><FONT COLOR="{color}">{name}</FONT>'
+            words[port] = words.get(port, "") + text
+            source = source.replace(edge[0], "", 1)
+    return source, words
 
 
 def write_diagram(

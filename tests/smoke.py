@@ -3,12 +3,12 @@
 Not collected by pytest; run as a script with any supported Python.
 """
 
+from importlib.metadata import version
 import math
 import platform
 import time
 import warnings
 
-import pydrake
 from pydrake.systems.analysis import Simulator
 
 from drake_affetto.scenario import load_scenario
@@ -33,7 +33,7 @@ def main() -> None:
         assert all(map(math.isfinite, state)), state
         print(
             f"smoke: {name}: {DURATION} s simulated on Python "
-            f"{platform.python_version()}, Drake {pydrake.__version__} "
+            f"{platform.python_version()}, Drake {version('drake')} "
             f"({time.process_time() - began:.1f} s of processor time)"
         )
 

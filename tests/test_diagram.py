@@ -1,3 +1,4 @@
+import re
 import xml.etree.ElementTree as ET
 
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
@@ -51,7 +52,7 @@ def test_every_connection_ends_at_a_port_that_is_drawn(
 ):
     source = graphviz_source(diagram, max_depth=depth, all_ports=all_ports)
     graph = pygraphviz.AGraph(string=source)
-    assert len(graph.edges()) == {0: 0, 1: 5, 2: 7}[depth]
+    assert len(graph.edges()) == {0: 0, 1: 3, 2: 5}[depth]
     for edge in graph.edges():
         for node, end in zip(edge, ("tailport", "headport"), strict=True):
             port = edge.attr[end].split(":")[0]
@@ -64,8 +65,26 @@ def test_ports_without_a_connection_are_left_out(diagram):
     for port in ("unused_input", "spare"):
         assert port not in few
         assert port in everything
-    for port in ("opening", "flow", "affetto.command", "affetto.flow"):
+    for port in ("opening", "flow", "command"):
         assert f">{port}<" in few
+
+
+def test_own_ports_are_named_where_they_are(diagram):
+    graph = pygraphviz.AGraph(string=graphviz_source(diagram, max_depth=1))
+    labels = {
+        re.search(r"name=(.*)", node.attr["label"])[1]: node.attr["label"]
+        for node in graph.nodes()
+    }
+    assert set(labels) == {"unit", "adder", "gain", "bias"}
+    for name, label in labels.items():
+        assert ("affetto.command" in label) == (name == "unit")
+        assert ("affetto.flow" in label) == (name == "adder")
+
+
+def test_class_stands_without_its_module(diagram):
+    source = graphviz_source(diagram, max_depth=2)
+    assert "<B>Valve</B>" in source
+    assert "drake_affetto.pneumatics" not in source
 
 
 def test_stage_gives_the_colour(diagram):

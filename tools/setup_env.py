@@ -145,7 +145,7 @@ def run_pip(log: IO[str], *what: str) -> None:
                 say(f"{seen} packages found; writing them")
     if process.returncode != 0:
         errors = [text for text in last_lines if text.startswith("ERROR")]
-        reason = (errors or list(last_lines) or ["pip said nothing"])[-1]
+        reason = [*errors[:1], *reversed(last_lines), "pip said nothing"][0]
         fail(f"pip could not install ({reason}); the whole log is {LOG}")
 
 
