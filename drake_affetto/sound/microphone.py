@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 import math
+from typing import Any
 
 import numpy as np
 from pydrake.common.value import Value
@@ -137,19 +138,18 @@ class DrumMicrophone(LeafSystem):
             table = plant.GetBodyIndices(
                 plant.GetModelInstanceByName(table_model)
             )
-        microphone = builder.AddSystem(
-            DrumMicrophone(
-                head=head.index(),
-                shell=[
-                    index
-                    for index in plant.GetBodyIndices(drum)
-                    if index != head.index()
-                ],
-                table=table,
-                X_BH=head_center.GetFixedPoseInBodyFrame(),
-            )
+        microphone = DrumMicrophone(
+            head=head.index(),
+            shell=[
+                index
+                for index in plant.GetBodyIndices(drum)
+                if index != head.index()
+            ],
+            table=table,
+            X_BH=head_center.GetFixedPoseInBodyFrame(),
         )
         microphone.set_name("drum_microphone")
+        builder.AddSystem(microphone)
         builder.Connect(
             plant.get_contact_results_output_port(),
             microphone.get_contact_results_input_port(),
@@ -179,7 +179,7 @@ class DrumMicrophone(LeafSystem):
     def _calc_contact_force(self, context: Context, output: BasicVector):
         result = output.get_mutable_value()
         result[:] = 0.0
-        contacts = self._contact_results_port.Eval(context)
+        contacts: Any = self._contact_results_port.Eval(context)
         count = contacts.num_point_pair_contacts()
         if not count:
             return
@@ -187,13 +187,15 @@ class DrumMicrophone(LeafSystem):
         pushes = []
         for i in range(count):
             info = contacts.point_pair_contact_info(i)
-            if int(info.bodyB_index()) == head:
-                pushes.append((info.contact_force(), info.contact_point()))
-            elif int(info.bodyA_index()) == head:
-                pushes.append((-info.contact_force(), info.contact_point()))
+            body_A, body_B = int(info.bodyA_index()), int(info.bodyB_index())
+            if head not in (body_A, body_B):
+                continue
+            sign = 1.0 if body_B == head else -1.0
+            pushes.append((sign * info.contact_force(), info.contact_point()))
         if not pushes:
             return
-        X_WB = self._body_poses_port.Eval(context)[head]
+        poses: Any = self._body_poses_port.Eval(context)
+        X_WB = poses[head]
         X_WH = X_WB.multiply(self._X_BH)
         p_WH = X_WH.translation()
         R_WH = X_WH.rotation().matrix()
@@ -215,7 +217,7 @@ class DrumMicrophone(LeafSystem):
     def _calc_knock_force(self, context: Context, output: BasicVector):
         result = output.get_mutable_value()
         result[:] = 0.0
-        contacts = self._contact_results_port.Eval(context)
+        contacts: Any = self._contact_results_port.Eval(context)
         for i in range(contacts.num_point_pair_contacts()):
             info = contacts.point_pair_contact_info(i)
             pair = {int(info.bodyA_index()), int(info.bodyB_index())}

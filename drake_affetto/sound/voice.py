@@ -53,9 +53,9 @@ class MembraneConfig:
     """Number of angular orders: m = 0 .. orders - 1."""
     circles: int = 3
     """Number of modes for each order: n = 1 .. circles."""
-    loss_factor: float = 0.02
+    loss_factor: float = 0.012
     """Internal loss eta: a mode decays by eta omega / 2."""
-    decay_rate: float = 8.0
+    decay_rate: float = 4.0
     """Decay common to all modes (rim and support) [1/s]."""
     air_loading: bool = True
     """Whether the air on both sides adds to the membrane's mass."""
@@ -131,17 +131,17 @@ def _shell_default() -> BodyConfig:
         qualities=[15.0, 15.0, 12.0],
         masses=[0.12, 0.12, 0.1],
         area=0.015,
-        coupling=0.002,
+        coupling=1e-4,
     )
 
 
 def _table_default() -> BodyConfig:
     return BodyConfig(
-        frequencies=[58.0, 97.0, 215.0],
-        qualities=[3.0, 3.0, 4.0],
-        masses=[4.0, 3.0, 2.0],
+        frequencies=[48.0, 77.0, 118.0, 260.0],
+        qualities=[4.0, 4.0, 5.0, 6.0],
+        masses=[10.0, 8.0, 8.0, 5.0],
         area=0.1,
-        coupling=0.0005,
+        coupling=5e-5,
     )
 
 
@@ -511,7 +511,7 @@ class DrumVoice:
         table = _vector("table_force", table_force, rows)
         radius = _vector("head_radius", head_radius, rows)
         config = self.config
-        samples = int(math.floor((rows - 1) * period * config.rate + 1e-6)) + 1
+        samples = math.floor((rows - 1) * period * config.rate + 1e-6) + 1
         pressure = np.zeros(samples)
 
         shape = np.zeros((rows, len(self.membrane.omega)))
@@ -650,7 +650,7 @@ def write_wav(
         full_scale *= 2.0
     data = np.round(samples / full_scale * 32767.0).astype(np.int16)
     try:
-        wavfile.write(path, int(round(rate)), data)
+        wavfile.write(path, round(rate), data)
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror}") from error
     return full_scale

@@ -1,0 +1,40 @@
+"""All settings of the sound, as `models/sound.yaml` holds them."""
+
+import dataclasses
+
+from drake_affetto.resources import resolve
+from drake_affetto.sound.reward import RewardConfig
+from drake_affetto.sound.voice import VoiceConfig
+
+
+@dataclasses.dataclass
+class SoundConfig:
+    """How the drum sounds and how its sound is judged."""
+
+    voice: VoiceConfig = dataclasses.field(default_factory=VoiceConfig)
+    reward: RewardConfig = dataclasses.field(default_factory=RewardConfig)
+
+    def check(self, where: str) -> None:
+        """Raises InputError naming the field that does not fit."""
+        self.voice.check(f"{where}.voice")
+        self.reward.check(f"{where}.reward")
+
+
+def load_sound_config(
+    uri: str = "package://drake_affetto/sound.yaml",
+) -> SoundConfig:
+    """Reads and checks a sound file.
+
+    Raises:
+        InputError: for a missing or malformed file, an unknown field or a
+            value out of range.
+    """
+    # Drake's YAML reader, which the mathematics beside this do not need.
+    from drake_affetto.yaml_config import read_yaml, typed
+
+    path = resolve(uri)
+    config = typed(
+        SoundConfig, read_yaml(path), where=path.name, defaults=SoundConfig()
+    )
+    config.check(path.name)
+    return config

@@ -1,0 +1,118 @@
+"""A soft hand on a surface, in one dimension: force profiles without a robot.
+
+Used for the experimenter's taps and for studies of the sound alone; in the
+station the forces come from the simulated contact.
+"""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from drake_affetto.errors import require
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclasses.dataclass
+class Hand:
+    """A mass on a spring-damper arm, with a Hunt-Crossley surface."""
+
+    mass: float = 0.35
+    """Mass that moves with the hand [kg]."""
+    arm_stiffness: float = 250.0
+    """Spring between the hand and where it is led [N/m]."""
+    arm_damping: float = 12.0
+    """Damper between the hand and where it is led [N s/m]."""
+    stiffness: float = 600.0
+    """Contact stiffness [N/m]."""
+    dissipation: float = 1.5
+    """Hunt-Crossley dissipation [s/m]."""
+
+
+def contact_force(
+    t: ArrayLike, target: ArrayLike, hand: Hand | list[Hand] | None = None
+) -> FloatArray:
+    """Force of hands that are led along `target` onto a surface at height 0.
+
+    Semi-implicit steps of the hand's height z under the arm's spring-damper
+    and F = max(0, -k z (1 - d z')) while z < 0; the hand starts at rest at
+    target[0]. Gravity is balanced by the arm.
+
+    Args:
+        t: evenly spaced times (T) [s].
+        target: heights to which the hands are led, (T,) or (T, N) [m].
+        hand: one hand for all, or one for each column.
+
+    Returns:
+        Force on the surface, same shape as `target` [N].
+
+    Raises:
+        InputError: for shapes that do not fit each other.
+    """
+    times = np.asarray(t, dtype=float)
+    path = np.asarray(target, dtype=float)
+    require(
+        path.ndim in (1, 2) and len(path) == len(times) >= 2,
+        "target",
+        f"an array of shape {path.shape}",
+        f"{len(times)} rows, at least 2",
+    )
+    columns = path.reshape(len(path), -1)
+    hands = hand if isinstance(hand, list) else [hand or Hand()]
+    require(
+        len(hands) in (1, columns.shape[1]),
+        "hand",
+        f"{len(hands)} hands",
+        f"1 or {columns.shape[1]}",
+    )
+    mass, spring, damper, stiffness, dissipation = np.array(
+        [dataclasses.astuple(one) for one in hands]
+    ).T
+    step = float(times[-1] - times[0]) / (len(times) - 1)
+    velocity = np.gradient(columns, step, axis=0)
+    z = columns[0].copy()
+    v = np.zeros_like(z)
+    force = np.zeros_like(columns)
+    for i in range(len(columns)):
+        depth = np.maximum(-z, 0.0)
+        force[i] = np.maximum(stiffness * depth * (1.0 - dissipation * v), 0.0)
+        v += (
+            step
+            / mass
+            * (
+                spring * (columns[i] - z)
+                + damper * (velocity[i] - v)
+                + force[i]
+            )
+        )
+        z += step * v
+    return force.reshape(path.shape)
+
+
+def stroke(
+    t: ArrayLike,
+    start: float,
+    height: float,
+    depth: float,
+    fall: float,
+    dwell: float,
+    rise: float,
+) -> FloatArray:
+    """Height of a stroke: down by a raised cosine, dwell, and up again.
+
+    Args:
+        t: times (T) [s].
+        start: when it starts to fall [s].
+        height: height above the surface before and after [m].
+        depth: how far below the surface it is led; negative: it stays above
+            by as much [m].
+        fall: duration of the way down [s].
+        dwell: time at the bottom [s].
+        rise: duration of the way up [s].
+    """
+    times = np.asarray(t, dtype=float) - start
+    down = np.clip(times / fall, 0.0, 1.0)
+    up = np.clip((times - fall - dwell) / rise, 0.0, 1.0)
+    share = 0.5 * (np.cos(np.pi * up) - np.cos(np.pi * down))
+    return height - (height + depth) * share

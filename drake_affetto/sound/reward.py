@@ -1,0 +1,317 @@
+"""From a recording to a reward: spectrogram, similarity, Eqs. 9 and 10.
+
+The spectrogram is compressed logarithmically above a floor, so that what the
+microphone and the valves always do counts for nothing, and of each frame only
+what stands out from the octaves around it is kept: a drum rings at its modes,
+a knock on something solid is as broad as it is short. The prototypes' norm
+then measures the drum alone, and R is 1 for the same sound, near 0 for
+silence, misses and knocks, and negative for other loud tones.
+"""
+
+from collections.abc import Sequence
+import dataclasses
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import fft, ndimage, signal
+
+from drake_affetto.errors import require, require_range
+from drake_affetto.sound import impact
+from drake_affetto.sound.voice import DrumVoice
+
+FloatArray = NDArray[np.float64]
+
+SUCCESS_THRESHOLD = 0.15
+"""A trial succeeded if its reward is above this (the paper's value)."""
+
+
+@dataclasses.dataclass
+class RewardConfig:
+    """How a recording is heard."""
+
+    window: float = 0.064
+    """Length of the Hann window of a frame [s]."""
+    hop: float = 0.016
+    """Time from frame to frame [s]."""
+    bands: int = 20
+    """Number of bands m, evenly spaced in log frequency."""
+    low: float = 60.0
+    """Lower edge of the lowest band [Hz]."""
+    high: float = 800.0
+    """Upper edge of the highest band [Hz]."""
+    floor: float = 1e-3
+    """Sound pressure (rms in a band) that just begins to count [Pa]."""
+    contrast: float = 1.0
+    """Share of the local mean over bands that is taken off; 0: none."""
+    contrast_width: float = 2.0
+    """Width of that local mean [octaves]."""
+    threshold: float = SUCCESS_THRESHOLD
+    """Reward above which a trial is a success."""
+    lead: float = 0.064
+    """Part of a prototype before its loudest frame [s]."""
+    length: float = 0.4
+    """Length of a prototype [s]."""
+
+    def check(self, where: str) -> None:
+        """Raises InputError naming the field that does not fit."""
+        require_range(f"{where}.window", self.window, 1e-3, 1.0)
+        require_range(f"{where}.hop", self.hop, 1e-4, self.window)
+        require_range(f"{where}.bands", self.bands, 1, 1000)
+        require_range(f"{where}.low", self.low, 1e-3)
+        require_range(f"{where}.high", self.high, self.low * 1.01)
+        require_range(f"{where}.floor", self.floor, 1e-12)
+        require_range(f"{where}.contrast", self.contrast, 0.0, 1.0)
+        require_range(f"{where}.contrast_width", self.contrast_width, 0.0)
+        require_range(f"{where}.threshold", self.threshold, 0.0, 1.0)
+        require_range(f"{where}.length", self.length, self.hop)
+        require_range(f"{where}.lead", self.lead, 0.0, self.length)
+
+
+def _filterbank(config: RewardConfig, rate: float, size: int) -> FloatArray:
+    """Weights (bands, size // 2 + 1): triangles on a log frequency axis."""
+    frequency = np.fft.rfftfreq(size, 1.0 / rate)
+    edges = np.geomspace(config.low, config.high, config.bands + 2)
+    position = np.interp(
+        np.log(np.maximum(frequency, 1e-3)),
+        np.log(edges),
+        np.arange(config.bands + 2, dtype=float),
+    )
+    centre = np.arange(1, config.bands + 1)[:, None]
+    return np.maximum(1.0 - np.abs(position[None, :] - centre), 0.0)
+
+
+def _padded_size(config: RewardConfig, rate: float, size: int) -> int:
+    """Length of the transform: at least two bins in the narrowest band."""
+    ratio = (config.high / config.low) ** (1.0 / (config.bands + 1))
+    narrowest = config.low * (ratio - 1.0)
+    return fft.next_fast_len(max(size, int(2.0 * rate / narrowest)), real=True)
+
+
+def spectrogram(
+    pressure: ArrayLike, rate: float, config: RewardConfig | None = None
+) -> FloatArray:
+    """What stands out of a recording: compressed band levels.
+
+    From L = log10(1 + P / floor^2), P the mean square sound pressure of a
+    frame in a band [Pa^2], the mean of L over the neighbouring bands is taken
+    off (`contrast`); what is left below zero counts as zero.
+
+    Args:
+        pressure: the recording (S) [Pa].
+        rate: its sampling rate [Hz].
+
+    Returns:
+        (bands, frames), non-negative.
+
+    Raises:
+        InputError: if the recording is shorter than one window or not finite,
+            or the bands do not fit its rate.
+    """
+    config = RewardConfig() if config is None else config
+    config.check("reward")
+    sound = np.asarray(pressure, dtype=float)
+    size = round(config.window * rate)
+    hop = max(1, round(config.hop * rate))
+    require(
+        sound.ndim == 1 and len(sound) >= size,
+        "pressure",
+        f"an array of shape {sound.shape}",
+        f"at least {size} samples, one window",
+    )
+    require(
+        bool(np.isfinite(sound).all()),
+        "pressure",
+        "not finite",
+        "finite numbers",
+    )
+    require_range("reward.high", config.high, high=0.5 * rate)
+    window = signal.windows.hann(size, sym=False)
+    frames = np.lib.stride_tricks.sliding_window_view(sound, size)[::hop]
+    # Padded so that even the lowest, narrowest band has bins of its own.
+    padded = _padded_size(config, rate, size)
+    spectrum = fft.rfft(frames * window, n=padded, axis=1)
+    # One-sided, and scaled so that the sum over all bins is the mean square.
+    power = (spectrum.real**2 + spectrum.imag**2) * (
+        2.0 / (padded * np.sum(window**2))
+    )
+    weights = _filterbank(config, rate, padded)
+    used = int(np.flatnonzero(weights.any(axis=0))[-1]) + 1
+    levels = np.log10(
+        1.0 + weights[:, :used] @ power[:, :used].T / config.floor**2
+    )
+    if config.contrast > 0.0:
+        per_octave = (config.bands + 1) / np.log2(config.high / config.low)
+        width = 2 * int(0.5 * config.contrast_width * per_octave) + 1
+        levels -= config.contrast * ndimage.uniform_filter1d(
+            levels, width, axis=0, mode="nearest"
+        )
+        np.maximum(levels, 0.0, out=levels)
+    return levels
+
+
+def similarity(s: ArrayLike, p: ArrayLike) -> float:
+    """The distance s * p of Eq. 9: how near `p` comes to anything in `s`.
+
+    The prototype slides over the recording, 0 <= o <= t_s - t_p, and the
+    least Frobenius distance of all places counts; 0 means that the recording
+    holds the prototype itself.
+
+    Args:
+        s: spectrogram of a recording (bands, t_s).
+        p: spectrogram of a prototype (bands, t_p), t_p <= t_s.
+
+    Raises:
+        InputError: if the bands differ or the prototype is longer.
+    """
+    recording = _spectrogram_array("s", s)
+    prototype = _spectrogram_array("p", p)
+    return float(_distances(recording, prototype[None])[0])
+
+
+def reward(recording: ArrayLike, prototypes: Sequence[ArrayLike]) -> float:
+    """Eq. 10: R = max_i (|f*_i| - f * f*_i) / |f*_i|.
+
+    Args:
+        recording: spectrogram (bands, t_s) of the trial.
+        prototypes: spectrograms (bands, t_i) of the demonstrations.
+
+    Returns:
+        At most 1. Above 0.15 the paper calls the trial a success.
+
+    Raises:
+        InputError: if there is no prototype, one of them is all silence, or
+            the shapes do not fit.
+    """
+    trial = _spectrogram_array("recording", recording)
+    require(len(prototypes) > 0, "prototypes", "none", "at least one")
+    groups: dict[int, list[FloatArray]] = {}
+    for i, prototype in enumerate(prototypes):
+        array = _spectrogram_array(f"prototypes[{i}]", prototype)
+        require(
+            bool(array.any()),
+            f"prototypes[{i}]",
+            "all zero",
+            "the spectrogram of a sound",
+        )
+        groups.setdefault(array.shape[1], []).append(array)
+    best = -np.inf
+    for group in groups.values():
+        stack = np.stack(group)
+        norms = np.sqrt(np.sum(stack**2, axis=(1, 2)))
+        ratio = _distances(trial, stack) / norms
+        best = max(best, 1.0 - float(np.min(ratio)))
+    return best
+
+
+def _distances(recording: FloatArray, stack: FloatArray) -> FloatArray:
+    """Least distances (N) of prototypes (N, bands, t_p) in a recording."""
+    count, bands, frames = stack.shape
+    require(
+        bands == recording.shape[0],
+        "prototype",
+        f"{bands} bands",
+        f"{recording.shape[0]} bands, as the recording has",
+    )
+    require(
+        frames <= recording.shape[1],
+        "prototype",
+        f"{frames} frames",
+        f"at most the {recording.shape[1]} frames of the recording",
+    )
+    # (places, bands, frames) -> one row for each place.
+    places = np.lib.stride_tricks.sliding_window_view(
+        recording, frames, axis=1
+    ).swapaxes(0, 1)
+    rows = places.reshape(len(places), -1)
+    columns = stack.reshape(count, -1)
+    # |a - b|^2 by correlation finds the place; there the difference itself is
+    # taken, because the sum loses all digits where the two are alike.
+    square = np.sum(rows**2, axis=1)[:, None] - 2.0 * rows @ columns.T
+    best = np.argmin(square, axis=0)
+    return np.linalg.norm(rows[best] - columns, axis=1)
+
+
+def cut_prototype(
+    recording: ArrayLike, config: RewardConfig | None = None
+) -> FloatArray:
+    """The part of a recording around its loudest moment.
+
+    Args:
+        recording: spectrogram (bands, frames) by `spectrogram`.
+        config: the one with which the spectrogram was made.
+
+    Returns:
+        (bands, t_p), `config.length` long or the whole recording if that is
+        shorter.
+
+    Raises:
+        InputError: if the recording is silent.
+    """
+    config = RewardConfig() if config is None else config
+    sound = _spectrogram_array("recording", recording)
+    loudness = np.sum(sound**2, axis=0)
+    require(
+        bool(loudness.any()), "recording", "silence", "a recording with sound"
+    )
+    frames = min(max(1, round(config.length / config.hop)), sound.shape[1])
+    lead = round(config.lead / config.hop)
+    start = int(np.argmax(loudness)) - lead
+    start = min(max(start, 0), sound.shape[1] - frames)
+    return sound[:, start : start + frames].copy()
+
+
+def tap_recordings(
+    voice: DrumVoice, rng: np.random.Generator
+) -> list[FloatArray]:
+    """What the microphone records when the experimenter taps the drum.
+
+    A few firm taps with a hand as soft as the robot's, short and long, at the
+    centre, half-way to the rim and near it, one recording each [Pa].
+    """
+    t = np.arange(0.0, 1.5, 1e-3)
+    a = voice.config.membrane.radius
+    recordings = []
+    for place in (0.1, 0.5, 0.75):
+        for depth, fall, dwell in (
+            (0.01, 0.3, 0.0),
+            (0.02, 0.4, 0.1),
+            (0.02, 0.4, 0.25),
+        ):
+            force = impact.contact_force(
+                t, impact.stroke(t, 0.2, 0.06, depth, fall, dwell, fall)
+            )
+            recordings.append(
+                voice.synthesise(t, force, np.full_like(t, place * a), rng=rng)
+            )
+    return recordings
+
+
+def tap_prototypes(
+    voice: DrumVoice,
+    config: RewardConfig | None = None,
+    rng: np.random.Generator | None = None,
+) -> list[FloatArray]:
+    """Prototypes (bands, t_p) from the experimenter's own taps.
+
+    They judge the first demonstrations, when the robot has not drummed yet.
+    """
+    config = RewardConfig() if config is None else config
+    rng = np.random.default_rng(0) if rng is None else rng
+    return [
+        cut_prototype(spectrogram(recording, voice.rate, config), config)
+        for recording in tap_recordings(voice, rng)
+    ]
+
+
+def _spectrogram_array(field: str, values: ArrayLike) -> FloatArray:
+    array = np.asarray(values, dtype=float)
+    require(
+        array.ndim == 2 and array.size > 0,
+        field,
+        f"an array of shape {array.shape}",
+        "a spectrogram (bands, frames)",
+    )
+    require(
+        bool(np.isfinite(array).all()), field, "not finite", "finite numbers"
+    )
+    return array
