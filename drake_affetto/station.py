@@ -4,7 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydrake.geometry import Meshcat, MeshcatVisualizer, SceneGraph
+from pydrake.geometry import (
+    Meshcat,
+    MeshcatVisualizer,
+    MeshcatVisualizerParams,
+    SceneGraph,
+)
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant
 from pydrake.systems.framework import (
@@ -100,12 +105,18 @@ class AffettoStation(Diagram):
     "skill", those of the controller only with valve_source "pidf".
     """
 
-    def __init__(self, scenario: Scenario, meshcat: Meshcat | None = None):
+    def __init__(
+        self,
+        scenario: Scenario,
+        meshcat: Meshcat | None = None,
+        meshcat_params: MeshcatVisualizerParams | None = None,
+    ):
         """Builds the diagram.
 
         Args:
             scenario: from `load_scenario`; it is checked again.
             meshcat: shows the robot there as it moves.
+            meshcat_params: how it is shown; Drake's defaults if None.
 
         Raises:
             InputError: if the scenario does not fit itself or the models.
@@ -138,7 +149,12 @@ class AffettoStation(Diagram):
         desired = self._add_motion(builder)
         self._add_control(builder, desired)
         if meshcat is not None:
-            MeshcatVisualizer.AddToBuilder(builder, self.scene_graph, meshcat)
+            MeshcatVisualizer.AddToBuilder(
+                builder,
+                self.scene_graph,
+                meshcat,
+                meshcat_params or MeshcatVisualizerParams(),
+            )
         builder.BuildInto(self)
         self.set_name("affetto_station")
 

@@ -59,6 +59,10 @@ def typed(
         InputError: for an unknown field or a value of the wrong type, by name.
     """
     _refuse_unknown(data, schema, where)
+    # Drake's reader takes some misfits (the letters of a word for a list).
+    misfit = _first_misfit(data, schema, where)
+    if misfit is not None:
+        raise InputError(misfit)
     try:
         return yaml_load_typed(
             schema=schema,
@@ -66,13 +70,14 @@ def typed(
             defaults=copy.deepcopy(defaults),
             retain_map_defaults=True,
         )
-    except (RuntimeError, TypeError, ValueError, AssertionError) as error:
-        culprit = _first_misfit(data, schema, where)
-        raise InputError(culprit or f"{where}: {error}") from error
-    except AttributeError as error:
-        # A scalar or a list stands where the schema has a mapping.
-        culprit = _first_misfit(data, schema, where)
-        raise InputError(culprit or f"{where}: {error}") from error
+    except (
+        RuntimeError,
+        TypeError,
+        ValueError,
+        AssertionError,
+        AttributeError,
+    ) as error:
+        raise InputError(f"{where}: {error}") from error
 
 
 def _fields(schema: Any) -> dict[str, Any]:
@@ -136,6 +141,7 @@ def _first_misfit(data: Any, schema: Any, where: str) -> str | None:
     elif schema in _SCALARS:
         try:
             fits = not isinstance(data, (list, dict, type(None), bool))
+            fits = fits and (schema is not int or int(data) == data)
             schema(data)
         except (TypeError, ValueError):
             fits = False

@@ -8,7 +8,7 @@ arguments alone, not on the trials before it.
 import dataclasses
 
 import numpy as np
-from pydrake.geometry import Meshcat
+from pydrake.geometry import Meshcat, MeshcatVisualizerParams
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator
 from pydrake.systems.framework import (
     Context,
@@ -96,12 +96,25 @@ class Lesson:
 class TrialRunner:
     """Runs trials of one scenario on one station."""
 
-    def __init__(self, scenario: Scenario, meshcat: Meshcat | None = None):
-        """Builds the station; see `AffettoStation` for what is raised."""
+    def __init__(
+        self,
+        scenario: Scenario,
+        meshcat: Meshcat | None = None,
+        meshcat_params: MeshcatVisualizerParams | None = None,
+        *,
+        start_time: float = 0.0,
+    ):
+        """Builds the station; see `AffettoStation` for what is raised.
+
+        Args:
+            start_time: a whole number of seconds; from when the robot comes
+                to rest, for replays of several trials one after another.
+        """
         self.scenario = scenario
+        self._start_time = start_time
         builder = DiagramBuilder()
         self.station = builder.AddNamedSystem(
-            "station", AffettoStation(scenario, meshcat)
+            "station", AffettoStation(scenario, meshcat, meshcat_params)
         )
         step = scenario.plant_config.time_step
         rates = {
@@ -159,6 +172,12 @@ class TrialRunner:
             seed: of the camera's noise.
         """
         begin = self._start(xy)
+        # Looking only: nothing is played within any trial's time.
+        self.station.policy.set_policy_parameters(
+            self._sub(self.station.policy),
+            np.zeros(self.station.num_joints * self.dmp.n_basis),
+            begin + 1e6,
+        )
         self._watch(seed)
         return self._wait_for_gaze(begin)
 
@@ -241,12 +260,12 @@ class TrialRunner:
             if self.context.get_time() > limit:
                 raise RuntimeError("the gaze has settled but is never ready")
             self._advance(self.context.get_time() + 0.05)
-        start = float(
-            self.station.GetOutputPort("affetto.start_time").Eval(
-                self._station_context
-            )[0]
-        )
+        start = float(self.port("affetto.start_time")[0])
         return look, self._record(start, seed)
+
+    def port(self, name: str):
+        """The value now of the station's output port `name`."""
+        return self.station.GetOutputPort(name).Eval(self._station_context)
 
     @property
     def _station_context(self) -> Context:
@@ -260,9 +279,9 @@ class TrialRunner:
         if self._settled is None:
             station = self.station
             station.reset(self._station_context)
-            self.context.SetTime(0.0)
+            self.context.SetTime(self._start_time)
             self.simulator.Initialize()
-            self._advance(self.scenario.settling_duration)
+            self._advance(self._start_time + self.scenario.settling_duration)
             self._settled = self.context.Clone()
         self.context.SetTimeStateAndParametersFrom(self._settled)
         self.station.set_drum_position(self._station_context, xy)

@@ -1,0 +1,204 @@
+"""The kinds of trial that studies plan, and how a worker runs them.
+
+A spec is a plain mapping. `kind` and `scenario` say what to run where; the
+rest determines the trial, including seeds. Results are plain numbers, arrays
+go beside them.
+"""
+
+from collections.abc import Mapping, Sequence
+import dataclasses
+import functools
+import hashlib
+from typing import Any
+
+import numpy as np
+
+from drake_affetto import __version__
+from drake_affetto.errors import InputError
+from drake_affetto.resources import models_dir
+from drake_affetto.scenario import Scenario, load_scenario
+from drake_affetto.skill.policy import Regressor
+from drake_affetto.studies.trials import TrialRunner
+
+# One runner, so one Diagram, for each scenario and process.
+_RUNNERS: dict[str, TrialRunner] = {}
+
+
+def runner(scenario: str) -> TrialRunner:
+    """This process's runner of a scenario, built when first asked for."""
+    if scenario not in _RUNNERS:
+        _RUNNERS[scenario] = TrialRunner(load_scenario(scenario))
+    return _RUNNERS[scenario]
+
+
+def set_runner(scenario: str, trial_runner: TrialRunner) -> None:
+    """Makes tasks in this process use `trial_runner`, e.g. one with Meshcat."""
+    _RUNNERS[scenario] = trial_runner
+
+
+@functools.cache
+def _models_digest() -> str:
+    digest = hashlib.sha256()
+    root = models_dir()
+    for path in sorted(root.rglob("*")):
+        if path.is_file() and path.suffix in (".sdf", ".yaml", ".xml", ".obj"):
+            digest.update(path.relative_to(root).as_posix().encode())
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@functools.cache
+def _fingerprint(scenario: str) -> dict[str, str]:
+    """What, besides its own numbers, determines a trial of a scenario."""
+    loaded = _plain(load_scenario(scenario))
+    return {
+        "name": scenario,
+        "values": hashlib.sha256(repr(loaded).encode()).hexdigest()[:16],
+        "models": _models_digest(),
+        "version": __version__,
+    }
+
+
+def _plain(value: Any) -> Any:
+    """The numbers of a config, Drake's own structs included."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {
+            f.name: _plain(getattr(value, f.name))
+            for f in dataclasses.fields(value)
+        }
+    if hasattr(value, "__fields__"):
+        return {
+            f.name: _plain(getattr(value, f.name)) for f in value.__fields__
+        }
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, Mapping):
+        return {k: _plain(v) for k, v in value.items()}
+    return value
+
+
+def _spec(kind: str, scenario: str, **rest: Any) -> dict[str, Any]:
+    return {"kind": kind, "scenario": _fingerprint(scenario), **rest}
+
+
+def demonstration(
+    scenario: str, xy: Sequence[float], seed: int
+) -> dict[str, Any]:
+    """Look for the drum at xy, be taught until the replay sounds.
+
+    Result: found, tau (2), attempts, success, reward, max_pull. Arrays: theta
+    (F), q (T, n), prototype (bands, frames); empty where nothing was found.
+    """
+    return _spec("demonstration", scenario, xy=list(xy), seed=seed)
+
+
+def drumming(
+    scenario: str,
+    xy: Sequence[float],
+    seed: int,
+    regressor: Regressor,
+    prototypes: Sequence[np.ndarray],
+) -> dict[str, Any]:
+    """The whole chain with the drum at xy, judged by its sound.
+
+    Result: found, tau (2), reward, success, max_force, impulse. Arrays: none.
+    """
+    return _spec(
+        "drumming",
+        scenario,
+        xy=list(xy),
+        seed=seed,
+        regressor=regressor,
+        prototypes=list(prototypes),
+    )
+
+
+def run_task(spec: Mapping[str, Any]) -> tuple[dict, dict[str, np.ndarray]]:
+    """Runs one spec in this process."""
+    tasks = {"demonstration": _run_demonstration, "drumming": _run_drumming}
+    if spec["kind"] not in tasks:
+        raise InputError(f"no kind of trial is called {spec['kind']!r}")
+    return tasks[spec["kind"]](spec)
+
+
+def _run_demonstration(spec: Mapping[str, Any]):
+    trials = runner(spec["scenario"]["name"])
+    threshold = trials.scenario.reward.threshold
+    xy, seed = np.array(spec["xy"]), spec["seed"]
+    look = trials.look(xy, seed)
+    result: dict[str, Any] = {
+        "found": look.found,
+        "tau": look.task_parameter.tolist(),
+        "attempts": 0,
+        "success": False,
+        "reward": 0.0,
+        "max_pull": 0.0,
+    }
+    empty = np.zeros((0, 0))
+    arrays = {"theta": np.zeros(0), "q": empty, "prototype": empty}
+    if not look.found:
+        return result, arrays
+    taps = trials.taps()
+    for attempt in range(trials.scenario.teaching.max_attempts):
+        lesson = trials.teach(xy, seed, attempt)
+        # The robot's own replay decides; each one has its own noise.
+        recording = trials.play(xy, lesson.theta, seed + 7919 * (attempt + 1))
+        value = trials.reward(recording, taps)
+        result["attempts"] = attempt + 1
+        result["max_pull"] = max(result["max_pull"], lesson.max_pull)
+        if value > result["reward"] or attempt == 0:
+            result["reward"] = value
+            arrays = {
+                "theta": lesson.theta,
+                "q": lesson.q,
+                "prototype": trials.prototype(recording),
+            }
+        if value > threshold:
+            result["success"] = True
+            break
+    return result, arrays
+
+
+def _run_drumming(spec: Mapping[str, Any]):
+    trials = runner(spec["scenario"]["name"])
+    look, recording = trials.drum(
+        np.array(spec["xy"]), spec["regressor"], spec["seed"]
+    )
+    result: dict[str, Any] = {
+        "found": look.found,
+        "tau": look.task_parameter.tolist(),
+        "reward": 0.0,
+        "success": False,
+        "max_force": 0.0,
+        "impulse": 0.0,
+    }
+    if recording is None:
+        return result, {}
+    value = trials.reward(recording, spec["prototypes"])
+    force = recording.contact_force[:, 0]
+    step = recording.t[1] - recording.t[0]
+    result.update(
+        reward=value,
+        success=bool(value > trials.scenario.reward.threshold),
+        max_force=float(force.max()),
+        impulse=float(force.sum() * step),
+    )
+    return result, {}
+
+
+def draw_positions(
+    scenario: Scenario, count: int, rng: np.random.Generator
+) -> np.ndarray:
+    """(count, 2) places for the drum, spread over the scenario's region.
+
+    A scrambled Sobol sequence: random, but without gaps or clusters.
+    """
+    from scipy.stats import qmc
+
+    region = scenario.drum_region
+    low = np.array([region.x[0], region.y[0]])
+    high = np.array([region.x[1], region.y[1]])
+    sampler = qmc.Sobol(2, rng=rng)
+    bits = max(1, int(np.ceil(np.log2(max(count, 2)))))
+    points = sampler.random_base2(bits)[:count]
+    return low + points * (high - low)

@@ -1,0 +1,93 @@
+"""The crew of workers: order, reuse, and workers that die."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drake_affetto.errors import InputError
+from drake_affetto.studies.pool import Crew
+from drake_affetto.studies.store import TrialStore
+
+
+def square(spec):
+    marks = Path(spec["marks"])
+    with (marks / f"{spec['i']}").open("a") as file:
+        file.write("ran\n")
+    return {"square": spec["i"] ** 2}, {"i": np.full(3, spec["i"])}
+
+
+def square_or_die_once(spec):
+    mark = Path(spec["marks"]) / "died"
+    if spec["i"] == 2 and not mark.exists():
+        mark.touch()
+        os._exit(9)
+    return square(spec)
+
+
+def die(spec):
+    os._exit(9)
+
+
+def refuse(spec):
+    raise InputError("the drum is not on the table")
+
+
+def specs(tmp_path, count=5):
+    return [
+        {"kind": "square", "i": i, "marks": str(tmp_path)} for i in range(count)
+    ]
+
+
+@pytest.mark.parametrize("workers", [0, 2])
+def test_results_come_in_the_order_of_the_plan(tmp_path, workers):
+    with (
+        TrialStore(tmp_path / "s.sqlite") as store,
+        Crew(square, store, workers=workers, quiet=True) as crew,
+    ):
+        results = crew.run("squares", specs(tmp_path))
+    assert [r["square"] for r, _ in results] == [0, 1, 4, 9, 16]
+    np.testing.assert_array_equal(results[3][1]["i"], [3, 3, 3])
+
+
+def test_what_is_finished_is_not_run_again(tmp_path):
+    for count in (3, 5):
+        with (
+            TrialStore(tmp_path / "s.sqlite") as store,
+            Crew(square, store, workers=0, quiet=True) as crew,
+        ):
+            crew.run("squares", specs(tmp_path, count))
+            reused = crew.reused
+    assert reused == 3
+    for i in range(5):
+        assert (tmp_path / str(i)).read_text() == "ran\n"
+
+
+def test_a_worker_that_dies_is_replaced(tmp_path):
+    with (
+        TrialStore(tmp_path / "s.sqlite") as store,
+        Crew(square_or_die_once, store, workers=2, quiet=True) as crew,
+    ):
+        results = crew.run("squares", specs(tmp_path))
+        assert len(store) == 5
+    assert [r["square"] for r, _ in results] == [0, 1, 4, 9, 16]
+
+
+def test_workers_that_always_die_end_the_study(tmp_path):
+    with (
+        TrialStore(tmp_path / "s.sqlite") as store,
+        Crew(die, store, workers=1, quiet=True) as crew,
+        pytest.raises(InputError, match="squares: worker processes die"),
+    ):
+        crew.run("squares", specs(tmp_path, 1))
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+def test_an_error_in_a_trial_reaches_the_user(tmp_path, workers):
+    with (
+        TrialStore(tmp_path / "s.sqlite") as store,
+        Crew(refuse, store, workers=workers, quiet=True) as crew,
+        pytest.raises(InputError, match="not on the table"),
+    ):
+        crew.run("squares", specs(tmp_path, 1))
