@@ -264,7 +264,7 @@ def face() -> Mesh:
 
 
 def hair() -> Mesh:
-    e, a, d = _directions(31, 56)
+    e, a, d = _directions(29, 52)
     back = 0.5 * (1 - np.cos(a))
     # The hairline: high over the forehead, above the ears, low in the neck.
     line = 0.62 - 1.05 * back**0.6 - 0.25 * np.exp(-((a / 0.22) ** 2))
@@ -344,21 +344,25 @@ def pelvis() -> Mesh:
 
 def bellows(height: float, ribs: int, a: float, b: float) -> Mesh:
     """A ribbed piece of the waist, from z = 0 to `height`."""
-    n = 6 * ribs
+    n = 4 * ribs
     z = np.linspace(-0.004, height + 0.004, n + 1)
     swell = 0.0035 * np.cos(2 * np.pi * ribs * np.arange(n + 1) / n)
     rows = [(0, 0, h, a - s, b - s) for h, s in zip(z, swell)]
     return sweep(
-        rows, around=28, along=n + 1, power=2.2, ends=(0.12, 0.12), caps=3
+        rows, around=24, along=n + 1, power=2.2, ends=(0.12, 0.12), caps=2
     )
 
 
 def neck() -> Mesh:
     return sweep(
-        [(0, 0, -0.006, 0.027, 0.028), (0, 0, 0.010, 0.0245, 0.0245)]
-        + [(0, 0, 0.030, 0.025, 0.025)],
-        along=7,
-        ends=(0.2, 0.6),
+        [
+            (0, 0, -0.006, 0.0290, 0.0300),
+            (-0.001, 0, 0.012, 0.0275, 0.0275),
+            (-0.002, 0, 0.040, 0.0290, 0.0285),
+            (-0.004, 0, 0.070, 0.0335, 0.0335),
+        ],
+        along=9,
+        ends=(0.2, 0.3),
     )
 
 
@@ -369,7 +373,7 @@ def collar() -> Mesh:
     """From the breast-bone outwards along +y."""
     return sweep(
         [(0, 0.0, 0, 0.020, 0.027), (0, 0.03, 0.001, 0.024, 0.028)]
-        + [(0, 0.058, 0, 0.0265, 0.0275)],
+        + [(0, 0.058, 0, 0.0255, 0.0265)],
         side=(1, 0, 0),
         along=8,
         ends=(0.6, 0.9),
@@ -498,7 +502,7 @@ MESHES = {
     "neck": neck,
     "chest": chest,
     "pelvis": pelvis,
-    "waist_low": lambda: bellows(0.024, 2, 0.045, 0.058),
+    "waist_low": lambda: bellows(0.024, 2, 0.0425, 0.0545),
     "waist_pitch": lambda: bellows(0.030, 2, 0.044, 0.057),
     "waist_roll": lambda: bellows(0.050, 3, 0.043, 0.056),
     "lumbar": lambda: bellows(0.062, 4, 0.042, 0.055),
