@@ -93,6 +93,8 @@ class DrumMicrophone(LeafSystem):
             )
         self._shell = shell_indices
         self._table = table_indices
+        self._drum = shell_indices | {self._head}
+        self._still = self._drum | self._table
         self._X_BH = RigidTransform() if X_BH is None else X_BH
         self._contact_results_port: InputPort = self.DeclareAbstractInputPort(
             "contact_results", Value(ContactResults())
@@ -184,32 +186,32 @@ class DrumMicrophone(LeafSystem):
         if not count:
             return
         head = self._head
+        drum = self._drum
         pushes = []
         for i in range(count):
             info = contacts.point_pair_contact_info(i)
             body_A, body_B = int(info.bodyA_index()), int(info.bodyB_index())
-            if head not in (body_A, body_B):
-                continue
-            sign = 1.0 if body_B == head else -1.0
-            pushes.append((sign * info.contact_force(), info.contact_point()))
+            if head == body_B and body_A not in drum:
+                pushes.append((1.0, info))
+            elif head == body_A and body_B not in drum:
+                pushes.append((-1.0, info))
         if not pushes:
             return
+        # Reading the poses copies all of them: only now that it matters.
         poses: Any = self._body_poses_port.Eval(context)
-        X_WB = poses[head]
-        X_WH = X_WB.multiply(self._X_BH)
-        p_WH = X_WH.translation()
-        R_WH = X_WH.rotation().matrix()
+        X_HW = poses[head].multiply(self._X_BH).inverse()
+        R_HW = X_HW.rotation()
         total = x = y = 0.0
-        for f_W, p_WC in pushes:
+        for sign, info in pushes:
             # Friction along the head, and what pushes its edge sideways, do
             # not move the membrane.
-            push = -float(f_W @ R_WH[:, 2])
+            push = -sign * R_HW.multiply(info.contact_force()).item(2)
             if push <= 0.0:
                 continue
-            p_H = R_WH.T @ (p_WC - p_WH)
+            p_HC = X_HW.multiply(info.contact_point())
             total += push
-            x += push * p_H[0]
-            y += push * p_H[1]
+            x += push * p_HC.item(0)
+            y += push * p_HC.item(1)
         if total > 0.0:
             result[0] = total
             result[1] = math.hypot(x, y) / total
@@ -220,11 +222,10 @@ class DrumMicrophone(LeafSystem):
         contacts: Any = self._contact_results_port.Eval(context)
         for i in range(contacts.num_point_pair_contacts()):
             info = contacts.point_pair_contact_info(i)
-            pair = {int(info.bodyA_index()), int(info.bodyB_index())}
-            # The shell's own contact with the table is not a knock.
-            on_shell = not pair.isdisjoint(self._shell)
-            on_table = not pair.isdisjoint(self._table)
-            if on_shell != on_table and self._head not in pair:
-                result[0 if on_shell else 1] += float(
-                    np.linalg.norm(info.contact_force())
-                )
+            bodies = int(info.bodyA_index()), int(info.bodyB_index())
+            if all(body in self._still for body in bodies):
+                # The drum stands on the table: no knock.
+                continue
+            for part, heard in enumerate((self._shell, self._table)):
+                if bodies[0] in heard or bodies[1] in heard:
+                    result[part] += float(np.linalg.norm(info.contact_force()))
