@@ -193,7 +193,7 @@ OFFSET = 6  # the integral
 T_LAST = 7  # time of the latest image with a marker
 X_LAST = 8  # and where the marker was
 Y_LAST = 9
-Q_LAST = 10
+Q_SEEN = 10  # and the joint's angle then
 IMAGE_GAIN = 11  # k, as corrected on the way
 MISSED = 12  # images in a row without marker
 SWEEP = 13  # leg of the search
@@ -202,7 +202,14 @@ SUM_1 = 15  # … and the sums of their τ
 SUM_2 = 16
 TAU_1 = 17
 TAU_2 = 18
-SIZE = 19
+STANDING = 19  # whether the joint stood at the latest image
+T_YAW = 20  # time of the latest image, marker or not
+Q_LAST = 21  # and the joint's angle then
+SIZE = 22
+
+# An integral begins only near the goal [rad]; farther off the way is free.
+_NEAR = 0.15
+_KEPT_ONCE_LOOSE = 0.2
 
 
 class Gaze:
@@ -280,11 +287,13 @@ class Gaze:
             x[T_BEGIN] = t_image
             x[T_RAMP], x[YAW_RAMP] = t, task.start_yaw
             x[YAW_GOAL], x[SPEED] = task.start_yaw, self.config.max_speed
-            x[T_LAST] = -np.inf
+            x[T_LAST], x[T_YAW] = -np.inf, t_image
+            x[Q_LAST] = q
         if task.mode == GazeMode.FIXED_YAW:
             self._look_from_fixed_yaw(x, t, blob, q, t_image, task)
         else:
             self._centre(x, t, blob, q, t_image, task)
+        x[T_YAW], x[Q_LAST] = t_image, q
         if (
             x[PHASE] in (GazePhase.TRACK, GazePhase.SEARCH)
             and t_image - x[T_BEGIN] > self.config.timeout
@@ -304,7 +313,10 @@ class Gaze:
     ) -> None:
         config = self.config
         behind = task.fixed_yaw - q
-        self._integrate(x, behind, t_image)
+        elapsed = t_image - x[T_YAW]
+        if elapsed > 0:
+            speed = abs(q - x[Q_LAST]) / elapsed
+            self._overcome_friction(x, behind, elapsed, speed <= config.still)
         self._go_to(x, t, task, task.fixed_yaw + x[OFFSET], config.max_speed)
         near = abs(behind) <= config.near_yaw
         if not blob[2] > 0.5:
@@ -349,8 +361,9 @@ class Gaze:
         way = -math.atan(error / self.view.focal) / x[IMAGE_GAIN]
         centred = abs(error) <= config.tolerance * self.view.width
         centred_yaw = q + way
-        if still:
-            self._integrate(x, way, t_image)
+        if math.isfinite(x[T_LAST]):
+            elapsed = t_image - x[T_LAST]
+            self._overcome_friction(x, way, elapsed, still)
         self._remember(x, blob, q, t_image)
         step = config.gain * way if not centred else way
         self._go_to(x, t, task, q + step + x[OFFSET], config.max_speed)
@@ -359,7 +372,7 @@ class Gaze:
     # Steps
 
     def _remember(self, x: Array, blob: Array, q: float, t: float) -> None:
-        x[T_LAST], x[X_LAST], x[Y_LAST], x[Q_LAST] = t, blob[0], blob[1], q
+        x[T_LAST], x[X_LAST], x[Y_LAST], x[Q_SEEN] = t, blob[0], blob[1], q
 
     def _is_still(self, x: Array, blob: Array, t: float) -> bool:
         """Whether the marker moved little since the image before."""
@@ -373,7 +386,7 @@ class Gaze:
 
     def _learn_image_gain(self, x: Array, blob: Array, q: float) -> None:
         """Corrects k by what a clear turn did to the image."""
-        turn = q - x[Q_LAST]
+        turn = q - x[Q_SEEN]
         if not math.isfinite(x[T_LAST]) or abs(turn) < 0.02:
             return
         focal, center = self.view.focal, self.view.center_x
@@ -384,15 +397,23 @@ class Gaze:
         seen = min(max(seen, 0.4 * nominal), 2.5 * nominal)
         x[IMAGE_GAIN] += 0.5 * (seen - x[IMAGE_GAIN])
 
-    def _integrate(self, x: Array, behind: float, t: float) -> None:
-        """Adds to the command what the joint stays behind, if for long."""
-        config = self.config
-        elapsed = t - x[T_LAST]
-        if not 0 < elapsed < 1.0 or abs(behind) > 0.15:
-            return
-        offset = x[OFFSET] + config.integral_gain * elapsed * behind
-        limit = config.integral_limit
-        x[OFFSET] = min(max(offset, -limit), limit)
+    def _overcome_friction(
+        self, x: Array, behind: float, elapsed: float, standing: bool
+    ) -> None:
+        """Integrates what the joint stays behind while it stands.
+
+        Once it moves, most of what it took to break loose is taken back: less
+        friction holds it now, and it would run past its goal.
+        """
+        if not standing:
+            if x[STANDING]:
+                x[OFFSET] *= _KEPT_ONCE_LOOSE
+        elif abs(behind) <= _NEAR:
+            config = self.config
+            offset = x[OFFSET] + config.integral_gain * elapsed * behind
+            limit = config.integral_limit
+            x[OFFSET] = min(max(offset, -limit), limit)
+        x[STANDING] = float(standing)
 
     def _go_to(
         self, x: Array, t: float, task: GazeTask, yaw: float, speed: float
