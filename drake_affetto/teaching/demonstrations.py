@@ -1,0 +1,439 @@
+"""Demonstrations and the file that keeps them.
+
+The file is HDF5. Its root carries the attributes `format`, `format_version`
+and `about`; each demonstration is a group `demonstrations/000000`, ... with
+
+- datasets `t` (T,) and `q` (T, n), and where they exist `theta` (n K,),
+  `task_parameter` (d,), `prototype` (bands, frames) and `drum_xy` (2,), each
+  with a checksum and the attributes `unit` and `about`;
+- attributes `joint_names` (n), `attempt`, `scenario`, `version`, and where
+  they exist `seed` and `reward`.
+
+A demonstration is added to a copy, which then takes the file's place: whoever
+is stopped at any moment loses the one being written and nothing else.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+import contextlib
+import csv
+import dataclasses
+import fcntl
+import os
+from pathlib import Path
+import re
+import shutil
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+import drake_affetto
+from drake_affetto.errors import InputError, require, require_file
+from drake_affetto.output import atomic_path
+
+FloatArray = NDArray[np.float64]
+
+FORMAT = "drake_affetto demonstrations"
+FORMAT_VERSION = 1
+
+ROBOT_LOG_JOINTS = (
+    "waist_yaw",
+    *(
+        f"{side}_{joint}"
+        for side in ("left", "right")
+        for joint in (
+            "shoulder_elevation",
+            "shoulder_abduction",
+            "shoulder_flexion",
+            "elbow_rotation",
+            "elbow_flexion",
+            "wrist_supination",
+        )
+    ),
+)
+"""The joints of the 13-DOF robot in the order of its logs: q0, q1, ..."""
+
+# What h5py raises where a file holds something else than it should.
+_DAMAGE = (KeyError, OSError, RuntimeError, TypeError, ValueError)
+
+# Field of `Demonstration`: unit and meaning, as the file tells them.
+_ARRAYS = {
+    "t": ("s", "time of each sample"),
+    "q": ("rad", "joint angles, a column for each of joint_names"),
+    "drum_xy": ("m", "the drum on the table, world frame"),
+    "theta": ("1", "movement primitive that was encoded from q"),
+    "task_parameter": ("1", "task parameter as the camera saw it"),
+    "prototype": ("1", "spectrogram of the replay's sound, bands by frames"),
+}
+
+
+@dataclasses.dataclass(eq=False)
+class Demonstration:
+    """One movement that a teacher showed, and what came of it.
+
+    Raises:
+        InputError: for arrays that do not fit each other, times that do not
+            rise, or numbers that are not finite.
+    """
+
+    t: FloatArray
+    """Times (T,) [s], rising."""
+    q: FloatArray
+    """Joint angles (T, n) [rad]."""
+    joint_names: tuple[str, ...]
+    """Names of the n joints."""
+    drum_xy: FloatArray | None = None
+    """Where the drum stood on the table (2,), world frame [m]."""
+    seed: int | None = None
+    """Seed of everything random in it."""
+    attempt: int = 0
+    """How many attempts at the same place came before it."""
+    theta: FloatArray | None = None
+    """Policy parameters (n K,) encoded from `q`."""
+    task_parameter: FloatArray | None = None
+    """Task parameter (d,) if the drum was looked at."""
+    reward: float | None = None
+    """Reward of the robot's own replay."""
+    prototype: FloatArray | None = None
+    """Spectrogram (bands, frames) of that replay's sound."""
+    scenario: str = ""
+    """Name of the scenario, or of the log it was converted from."""
+    version: str = drake_affetto.__version__
+    """Version of this package that made it."""
+
+    def __post_init__(self):
+        self.joint_names = tuple(str(name) for name in self.joint_names)
+        self._array("t", 1)
+        self._array("q", 2)
+        self._array("drum_xy", 1)
+        self._array("theta", 1)
+        self._array("task_parameter", 1)
+        self._array("prototype", 2)
+        require(len(self.t) >= 2, "t", f"{len(self.t)} samples", "at least 2")
+        require(
+            bool(np.all(np.diff(self.t) > 0.0)),
+            "t",
+            "times that do not rise",
+            "rising times",
+        )
+        expected = (len(self.t), len(self.joint_names))
+        require(
+            self.q.shape == expected,
+            "q",
+            f"an array of shape {self.q.shape}",
+            f"shape {expected}: times by joints",
+        )
+        if self.drum_xy is not None:
+            require(
+                self.drum_xy.shape == (2,),
+                "drum_xy",
+                f"an array of shape {self.drum_xy.shape}",
+                "x and y",
+            )
+        if self.seed is not None:
+            self.seed = int(self.seed)
+            require(0 <= self.seed < 2**63, "seed", self.seed, "0 to 2^63 - 1")
+        self.attempt = int(self.attempt)
+        require(self.attempt >= 0, "attempt", self.attempt, "at least 0")
+        if self.reward is not None:
+            self.reward = float(self.reward)
+            require(
+                bool(np.isfinite(self.reward)),
+                "reward",
+                self.reward,
+                "a finite number",
+            )
+
+    def _array(self, field: str, dimensions: int) -> None:
+        """Makes the field an array of its own, of floats."""
+        value = getattr(self, field)
+        if value is None and field not in ("t", "q"):
+            return
+        try:
+            array = np.array(value, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{field} is no array of numbers") from error
+        require(
+            array.ndim == dimensions,
+            field,
+            f"an array of shape {array.shape}",
+            f"{dimensions} dimension(s)",
+        )
+        require(
+            bool(np.isfinite(array).all()),
+            field,
+            "not finite",
+            "finite numbers",
+        )
+        setattr(self, field, array)
+
+
+def append_demonstration(path: str | Path, demonstration: Demonstration) -> int:
+    """Adds a demonstration to the file, which is made where there is none.
+
+    Several processes may add to one file.
+
+    Returns:
+        How many the file now holds.
+
+    Raises:
+        InputError: if the file is not one of demonstrations, is damaged or
+            cannot be written. It is then left as it was.
+    """
+    path = Path(path)
+    with _only_writer(path), atomic_path(path) as fresh:
+        if path.exists():
+            shutil.copyfile(path, fresh)
+        # Damage shows while the copy is read and added to, not in the file.
+        with _opened(fresh, "r+" if fresh.exists() else "x", path) as file:
+            try:
+                group = file.require_group("demonstrations")
+                number = len(group)
+                _write(group.create_group(f"{number:06d}"), demonstration)
+            except _DAMAGE as error:
+                raise InputError(
+                    f"cannot add to {path}: {_short(error)}"
+                ) from error
+        _to_disk(fresh)
+    return number + 1
+
+
+def write_demonstrations(
+    path: str | Path, demonstrations: Iterable[Demonstration]
+) -> None:
+    """Writes a file of exactly these, whole or not at all.
+
+    Raises:
+        InputError: if it cannot be written.
+    """
+    path = Path(path)
+    with _only_writer(path), atomic_path(path) as fresh:
+        with _opened(fresh, "x", path) as file:
+            group = file.require_group("demonstrations")
+            for number, demonstration in enumerate(demonstrations):
+                _write(group.create_group(f"{number:06d}"), demonstration)
+        _to_disk(fresh)
+
+
+def _to_disk(path: Path) -> None:
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
+
+
+def read_demonstrations(path: str | Path) -> list[Demonstration]:
+    """All demonstrations of a file, in the order in which they were added.
+
+    Raises:
+        InputError: if there is no such file, it is not one of demonstrations,
+            comes from a newer version of this package, or is damaged.
+    """
+    path = require_file("demonstrations", path)
+    with _opened(path) as file:
+        where = str(path)
+        try:
+            demonstrations = []
+            group = file["demonstrations"]
+            for name in sorted(group):
+                where = f"{path}: demonstration {name}"
+                demonstrations.append(_read(group[name]))
+            return demonstrations
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from error
+        except _DAMAGE as error:
+            raise InputError(f"{where} is damaged: {_short(error)}") from error
+
+
+def from_robot_csv(
+    path: str | Path,
+    limits: Mapping[str, tuple[float, float]],
+    *,
+    joints: Sequence[str] = ROBOT_LOG_JOINTS,
+    drum_xy: Sequence[float] | None = None,
+) -> Demonstration:
+    """Converts a log that the robot's own library wrote.
+
+    Column `t` is time in seconds, columns `q0`, `q1`, ... the measured angles
+    in percent of each joint's range. Time then starts at 0.
+
+    Args:
+        path: the CSV file.
+        limits: lower and upper limit [rad] of the joints that are wanted, by
+            name; the demonstration has them in this order.
+        joints: names of the log's joints, for q0, q1, ...
+        drum_xy: where the drum stood, if that is known [m].
+
+    Raises:
+        InputError: for a missing file or column, a cell that is not a number,
+            times that do not rise, an unknown joint, or limits that are none.
+    """
+    path = require_file("log", path)
+    require(len(limits) > 0, "limits", limits, "at least one joint")
+    columns = ["t"]
+    for name, (lower, upper) in limits.items():
+        require(name in joints, "limits", name, f"one of {', '.join(joints)}")
+        require(
+            bool(np.isfinite([lower, upper]).all()) and lower < upper,
+            f"limits of {name}",
+            (lower, upper),
+            "a lower and a higher angle",
+        )
+        columns.append(f"q{list(joints).index(name)}")
+    table = _read_columns(path, columns)
+    lower, upper = np.array([tuple(pair) for pair in limits.values()]).T
+    try:
+        return Demonstration(
+            t=table[:, 0] - table[0, 0],
+            q=lower + table[:, 1:] / 100.0 * (upper - lower),
+            joint_names=tuple(limits),
+            drum_xy=None if drum_xy is None else np.asarray(drum_xy),
+            scenario=path.name,
+        )
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _read_columns(path: Path, columns: Sequence[str]) -> FloatArray:
+    """These columns of a CSV file with a header."""
+    rows = []
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            reader = csv.reader(file)
+            header = next(reader, [])
+            missing = [name for name in columns if name not in header]
+            if missing:
+                raise InputError(f"{path} has no column {missing[0]!r}")
+            places = [header.index(name) for name in columns]
+            for line, row in enumerate(reader, start=2):
+                if not row:
+                    continue
+                try:
+                    rows.append([float(row[place]) for place in places])
+                except (IndexError, ValueError) as error:
+                    raise InputError(
+                        f"{path}, line {line}: a number is missing in one of "
+                        f"the columns {', '.join(columns)}"
+                    ) from error
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"cannot read {path}: {_short(error)}") from error
+    require(len(rows) >= 2, str(path), f"{len(rows)} samples", "at least two")
+    return np.array(rows)
+
+
+@contextlib.contextmanager
+def _opened(
+    file_path: Path, mode: str = "r", name: Path | None = None
+) -> Iterator[h5py.File]:
+    """The file, known to be one of demonstrations.
+
+    Errors call it `name`, if that is given: a copy has no name of its own.
+    """
+    path = name or file_path
+    try:
+        # The format with checksums over its own structure.
+        file = h5py.File(file_path, mode, libver=("v110", "v110"))
+    except OSError as error:
+        text = str(error)
+        if "truncated" in text:
+            what = "is truncated"
+        elif "signature" in text:
+            what = "is no HDF5 file"
+        else:
+            what = f"cannot be opened: {_short(error)}"
+        raise InputError(f"{path} {what}") from error
+    with file:
+        if mode == "x":
+            file.attrs["format"] = FORMAT
+            file.attrs["format_version"] = FORMAT_VERSION
+            file.attrs["about"] = (
+                "Movements taught to a drumming robot by hand. Each group of "
+                "/demonstrations is one; its datasets name their units."
+            )
+        try:
+            found = file.attrs.get("format")
+            version = int(file.attrs.get("format_version", 0))
+        except _DAMAGE as error:
+            raise InputError(f"{path} is damaged: {_short(error)}") from error
+        if found != FORMAT:
+            raise InputError(f"{path} is not a file of demonstrations")
+        if not 1 <= version <= FORMAT_VERSION:
+            raise InputError(
+                f"{path} has format version {version}, which this version of "
+                f"drake_affetto does not know (it knows {FORMAT_VERSION})"
+            )
+        yield file
+
+
+def _write(group: h5py.Group, demonstration: Demonstration) -> None:
+    for field, (unit, about) in _ARRAYS.items():
+        value = getattr(demonstration, field)
+        if value is None:
+            continue
+        dataset = group.create_dataset(
+            field,
+            data=value,
+            chunks=value.shape if value.size else None,
+            fletcher32=value.size > 0,
+        )
+        dataset.attrs["unit"] = unit
+        dataset.attrs["about"] = about
+    group.attrs["joint_names"] = list(demonstration.joint_names)
+    for field in ("seed", "attempt", "reward", "scenario", "version"):
+        value = getattr(demonstration, field)
+        if value is not None:
+            group.attrs[field] = value
+
+
+def _read(group: h5py.Group) -> Demonstration:
+    arrays: dict[str, Any] = {
+        field: group[field][()] if field in group else None for field in _ARRAYS
+    }
+    attributes = group.attrs
+    names = [
+        name.decode() if isinstance(name, bytes) else str(name)
+        for name in attributes["joint_names"]
+    ]
+    seed = attributes.get("seed")
+    reward = attributes.get("reward")
+    return Demonstration(
+        **arrays,
+        joint_names=tuple(names),
+        seed=None if seed is None else int(seed),
+        attempt=int(attributes["attempt"]),
+        reward=None if reward is None else float(reward),
+        scenario=str(attributes["scenario"]),
+        version=str(attributes["version"]),
+    )
+
+
+@contextlib.contextmanager
+def _only_writer(path: Path) -> Iterator[None]:
+    """Holds all other writers of this folder off, and tidies up after them.
+
+    The lock goes with the process, however that ends; what it leaves is a
+    hidden copy beside the file, which the next writer removes.
+    """
+    try:
+        folder = os.open(path.parent, os.O_RDONLY)
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror}") from error
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX)
+        left_over = re.compile(
+            rf"\.{re.escape(path.stem[:100])}\.[0-9a-f]{{8}}"
+            rf"{re.escape(path.suffix)}"
+        )
+        for name in os.listdir(folder):
+            if left_over.fullmatch(name):
+                with contextlib.suppress(OSError):
+                    os.unlink(name, dir_fd=folder)
+        yield
+    finally:
+        os.close(folder)
+
+
+def _short(error: Exception) -> str:
+    """The first line of what a library says, without its parentheses."""
+    strerror = getattr(error, "strerror", None)
+    lines = str(strerror or error).splitlines() or [type(error).__name__]
+    return lines[0].strip("'\"")
