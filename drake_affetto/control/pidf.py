@@ -109,17 +109,22 @@ class ControlParameters:
     Args:
         integral_limit: greatest part of u that the integral may ask for, Pa.
         difference_limit: greatest pressure difference u asked for, Pa.
+        integral_deadband: errors up to this are not integrated, rad. An
+            integrator that works on a joint held by dry friction makes it
+            jump to and fro for ever.
         gains: gains by joint name.
     """
 
     integral_limit: float = 300e3
     difference_limit: float = 550e3
+    integral_deadband: float = 0.005
     gains: dict[str, JointGains] = dataclasses.field(default_factory=dict)
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that does not fit."""
         require_range(f"{where}.integral_limit", self.integral_limit, 0.0)
         require_range(f"{where}.difference_limit", self.difference_limit, 0.0)
+        require_range(f"{where}.integral_deadband", self.integral_deadband, 0.0)
         for name, gains in self.gains.items():
             gains.check(f"{where}.gains.{name}")
 
@@ -176,6 +181,7 @@ def pidf_update(
     gains: NDArray[np.float64],
     integral_limit: float,
     difference_limit: float,
+    integral_deadband: float,
     desired_state: NDArray[np.float64],
     estimated_state: NDArray[np.float64],
     pressure: NDArray[np.float64],
@@ -194,6 +200,7 @@ def pidf_update(
         gains: (4, n) rows kP, kI, kD, kF.
         integral_limit: limit of kI ∫e dt, Pa.
         difference_limit: limit of the demand u, Pa.
+        integral_deadband: error that is not integrated, rad.
         desired_state: (2n) [q_des; q̇_des], rad and rad/s.
         estimated_state: (2n) [q; q̇].
         pressure: (2n) [p_a; p_b], Pa.
@@ -210,7 +217,8 @@ def pidf_update(
         proportional = gains[0, i] * error + gains[2, i] * error_rate
         difference = pressure[i] - pressure[n + i]
 
-        trial = integral[i] + h * error
+        excess = error - min(max(error, -integral_deadband), integral_deadband)
+        trial = integral[i] + h * excess
         u = proportional + offset[i] + k_i * trial
         v = gains[3, i] * (
             min(max(u, -difference_limit), difference_limit) - difference

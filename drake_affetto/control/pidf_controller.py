@@ -80,6 +80,7 @@ class PidfController(LeafSystem):
         period: float = 0.005,
         integral_limit: float = 300e3,
         difference_limit: float = 550e3,
+        integral_deadband: float = 0.0,
     ):
         """Declares ports, state and the periodic update.
 
@@ -88,6 +89,7 @@ class PidfController(LeafSystem):
             period: of the updates, s.
             integral_limit: greatest part of u from the integral, Pa.
             difference_limit: greatest |u|, Pa.
+            integral_deadband: error that is not integrated, rad.
 
         Raises:
             InputError: for arguments that do not fit.
@@ -96,10 +98,15 @@ class PidfController(LeafSystem):
         PidfConfig(period=period).check("PidfController")
         require_range("integral_limit", integral_limit, 0.0)
         require_range("difference_limit", difference_limit, 0.0)
+        require_range("integral_deadband", integral_deadband, 0.0)
         n = gains.kP.size
         self._n = n
         self._period = float(period)
-        self._limits = (float(integral_limit), float(difference_limit))
+        self._limits = (
+            float(integral_limit),
+            float(difference_limit),
+            float(integral_deadband),
+        )
         self._gains_index = int(
             self.DeclareNumericParameter(BasicVector(gains.to_array().ravel()))
         )
@@ -143,6 +150,7 @@ class PidfController(LeafSystem):
             period=config.period,
             integral_limit=parameters.integral_limit,
             difference_limit=parameters.difference_limit,
+            integral_deadband=parameters.integral_deadband,
         )
         return builder.AddNamedSystem(name, system)
 

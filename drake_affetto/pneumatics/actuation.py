@@ -47,12 +47,18 @@ class PneumaticActuationConfig:
         parameters: YAML file of `PneumaticParameters`.
         overlays: YAML files that change some of them, for instance a fit.
         time_step: update period, s; the plant's.
+        look_ahead: steps by which the joint state that the update reads lags
+            behind the one the torque will act on. 0 for a MultibodyPlant with
+            sampled output ports (its default): its step is an unrestricted
+            update, which Drake does before the discrete ones of that instant.
+            1 for a plant without them, which steps at the same time.
     """
 
     mode: str = "flow"
     parameters: str = DEFAULT_FILE
     overlays: list[str] = dataclasses.field(default_factory=list)
     time_step: float = 0.001
+    look_ahead: float = 0.0
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that cannot be."""
@@ -63,6 +69,7 @@ class PneumaticActuationConfig:
             "'flow' or 'regulator'",
         )
         require_range(f"{where}.time_step", self.time_step, 1e-6, 0.01)
+        require_range(f"{where}.look_ahead", self.look_ahead, 0.0, 2.0)
 
 
 class PneumaticActuation(LeafSystem):
@@ -102,6 +109,7 @@ class PneumaticActuation(LeafSystem):
         *,
         mode: str = "flow",
         time_step: float = 0.001,
+        look_ahead: float = 0.0,
         max_dead_time: float | None = None,
     ):
         """Declares ports, state and the periodic update.
@@ -110,6 +118,7 @@ class PneumaticActuation(LeafSystem):
             parameters: (ROWS, n) array, from `PneumaticParameters.for_joints`.
             mode: "flow" or "regulator".
             time_step: update period, s; the plant's.
+            look_ahead: see `PneumaticActuationConfig`.
             max_dead_time: longest dead time that parameters set later may
                 have, s; by default the longest among `parameters`.
 
@@ -117,7 +126,9 @@ class PneumaticActuation(LeafSystem):
             InputError: for arguments that do not fit.
         """
         LeafSystem.__init__(self)
-        config = PneumaticActuationConfig(mode=mode, time_step=time_step)
+        config = PneumaticActuationConfig(
+            mode=mode, time_step=time_step, look_ahead=look_ahead
+        )
         config.check("PneumaticActuation")
         array = np.array(parameters, dtype=float)
         require(
@@ -130,6 +141,7 @@ class PneumaticActuation(LeafSystem):
         self._shape = array.shape
         self._mode = _MODES[mode]
         self._time_step = float(time_step)
+        self._look_ahead = float(look_ahead)
         if max_dead_time is None:
             max_dead_time = largest_dead_time(array)
         self._slots = line_slots(self._time_step, max_dead_time)
@@ -191,6 +203,7 @@ class PneumaticActuation(LeafSystem):
             parameters.for_joints(joint_names, q_lower, q_upper),
             mode=config.mode,
             time_step=config.time_step,
+            look_ahead=config.look_ahead,
         )
         return builder.AddNamedSystem(name, system)
 
@@ -332,6 +345,7 @@ class PneumaticActuation(LeafSystem):
         step_joints(
             self._time_step,
             self._mode,
+            self._look_ahead,
             context.get_numeric_parameter(self._parameter_index)
             .value()
             .reshape(self._shape),

@@ -25,16 +25,20 @@ How a step is taken (why it is stable for any valve, at any step):
   replaced by a safeguarded implicit Euler step, which does not either;
 - valve: the lag's exact response to a command held over the step, after the
   dead time (interpolated in the line's memory);
-- the torque computed in a step acts in the plant's next step: volume and
-  friction are therefore taken at the joint angle extrapolated to its start.
+- the torque is that of the joint angle which the plant's next step starts
+  from, so that torque and motion exchange energy as in symplectic Euler.
 
 Friction is elastic-plastic: bristles of stiffness σ0 with damping σ1 hold the
-joint (a true stick phase, without creep) until the torque reaches the
-Stribeck curve F(q̇) = F_c + (F_s - F_c) exp(-(q̇/v_s)²), beyond which they
-slip. What they give back is only what they stored: friction never drives.
-(Dupont et al., IEEE Trans. Automatic Control 47(5), 2002.) The viscous part is
-not here: it is the joint's damping in the robot's SDF, which the plant
-integrates implicitly.
+joint (a true stick phase, without creep) until the torque reaches
+
+    F(q̇) = F_c + (F_s - F_c) exp(-(q̇/v_s)²) + λ F_d,
+
+beyond which they slip. What they give back is only what they stored: friction
+never drives. (Dupont et al., IEEE Trans. Automatic Control 47(5), 2002.) F_d
+is what a seal has more after a long rest: λ falls from 1 with the travelled
+angle s, dλ = -λ ds/s_d, and returns at rest, dλ = (1 - λ) dt/t_d. The viscous
+part is not here: it is the joint's damping in the robot's SDF, which the
+plant integrates implicitly.
 """
 
 import enum
@@ -60,6 +64,8 @@ class Row(enum.IntEnum):
     m³/(s Pa). `UNDERLAP`: opening of both edges at rest, as a fraction of the
     full stroke; a negative one is a dead band. `REGULATOR_GAIN`: 1/Pa.
     `STIFFNESS`, `DAMPING`: of the bristles, N m/rad and N m s/rad.
+    `DWELL_TORQUE`, `DWELL_TRAVEL`, `DWELL_RECOVERY`: F_d, s_d and t_d, N m,
+    rad and s; no recovery where t_d is 0.
     """
 
     Q_LOWER = 0
@@ -81,10 +87,13 @@ class Row(enum.IntEnum):
     STRIBECK_VELOCITY = 16
     STIFFNESS = 17
     DAMPING = 18
-    SUPPLY = 19
-    ATMOSPHERE = 20
-    TEMPERATURE = 21
-    EXPONENT = 22
+    DWELL_TORQUE = 19
+    DWELL_TRAVEL = 20
+    DWELL_RECOVERY = 21
+    SUPPLY = 22
+    ATMOSPHERE = 23
+    TEMPERATURE = 24
+    EXPONENT = 25
 
 
 ROWS = len(Row)
@@ -114,17 +123,14 @@ _BREAKAWAY = int(Row.BREAKAWAY)
 _STRIBECK_VELOCITY = int(Row.STRIBECK_VELOCITY)
 _STIFFNESS = int(Row.STIFFNESS)
 _DAMPING = int(Row.DAMPING)
+_DWELL_TORQUE = int(Row.DWELL_TORQUE)
+_DWELL_TRAVEL = int(Row.DWELL_TRAVEL)
+_DWELL_RECOVERY = int(Row.DWELL_RECOVERY)
 _SUPPLY = int(Row.SUPPLY)
 _ATMOSPHERE = int(Row.ATMOSPHERE)
 _TEMPERATURE = int(Row.TEMPERATURE)
 _EXPONENT = int(Row.EXPONENT)
 
-_LOOK_AHEAD = 0.5
-"""Weight of the last change of velocity in the extrapolated angle.
-
-1 is exact for the plant's own (symplectic Euler) step, 0 for a joint at
-constant velocity, 1/2 for a joint moved smoothly from outside.
-"""
 _HEAD = 2
 """Leading entries of the memory: whether it is filled, the line's head."""
 
@@ -133,9 +139,9 @@ def memory_size(n: int, time_step: float, dead_time: float) -> int:
     """Size of the memory vector of `n` joints for the longest dead time [s].
 
     It holds [filled, head, mass (2n), spool (2n), angle (n), velocity (n),
-    bristle (n), line (slots x 2n)].
+    bristle (n), dwell (n), line (slots x 2n)].
     """
-    return _HEAD + 7 * n + line_slots(time_step, dead_time) * 2 * n
+    return _HEAD + 8 * n + line_slots(time_step, dead_time) * 2 * n
 
 
 def line_slots(time_step: float, dead_time: float) -> int:
@@ -348,15 +354,14 @@ def stribeck_torque(
 
 @numba.njit(cache=True)
 def friction_step(
-    z, angle_change, velocity, coulomb, breakaway, width, stiffness, damping
+    z, angle_change, velocity, limit, stiffness, damping
 ) -> tuple[float, float]:
     """Deflection of the bristles [rad] and friction torque [N m] after a step.
 
     The torque opposes motion: it is to be subtracted from the drive's.
     """
-    if stiffness <= 0.0 or breakaway <= 0.0:
+    if stiffness <= 0.0 or limit <= 0.0:
         return 0.0, 0.0
-    limit = stribeck_torque(velocity, coulomb, breakaway, width)
     z_limit = limit / stiffness
     z_trial = z + angle_change
     z_new = min(max(z_trial, -z_limit), z_limit)
@@ -381,6 +386,7 @@ def joint_volume(q, i, parameters) -> tuple[float, float]:
 def step_joints(
     h: float,
     mode: int,
+    look_ahead: float,
     parameters: NDArray[np.float64],
     command: NDArray[np.float64],
     joint_state: NDArray[np.float64],
@@ -394,6 +400,8 @@ def step_joints(
     Args:
         h: time step, s.
         mode: `FLOW_MODE` or `REGULATOR_MODE`.
+        look_ahead: steps by which `joint_state` is to be extrapolated, to the
+            angle at which the torque will act: 0 where it is that angle.
         parameters: (ROWS, n), see `Row`.
         command: (n) openings, or (2n) pressures [p_a; p_b] in Pa absolute.
         joint_state: (2n) [q; q̇] at the step's start, rad and rad/s.
@@ -409,7 +417,8 @@ def step_joints(
     angle = memory[_HEAD + 4 * n : _HEAD + 5 * n]
     speed = memory[_HEAD + 5 * n : _HEAD + 6 * n]
     bristle = memory[_HEAD + 6 * n : _HEAD + 7 * n]
-    line = memory[_HEAD + 7 * n :]
+    dwell = memory[_HEAD + 7 * n : _HEAD + 8 * n]
+    line = memory[_HEAD + 8 * n :]
     slots = line.size // (2 * n)
 
     if memory[0] == 0.0:
@@ -419,6 +428,7 @@ def step_joints(
             angle[i] = joint_state[i]
             speed[i] = joint_state[n + i]
             bristle[i] = 0.0
+            dwell[i] = 1.0
             V_a, V_b = joint_volume(angle[i], i, parameters)
             RT = GAS_CONSTANT * parameters[_TEMPERATURE, i]
             mass[i] = pressure[i] * V_a / RT
@@ -437,8 +447,10 @@ def step_joints(
     for i in range(n):
         q = joint_state[i]
         v = joint_state[n + i]
-        v_next = v + _LOOK_AHEAD * (v - speed[i])
-        q_next = q + h * v_next
+        # Half of the last change of velocity: between the plant's Euler step
+        # (which would want all of it) and a smooth motion from outside.
+        v_next = v + 0.5 * look_ahead * (v - speed[i])
+        q_next = q + look_ahead * h * v_next
         V_old_a, V_old_b = joint_volume(angle[i], i, parameters)
         V_new_a, V_new_b = joint_volume(q_next, i, parameters)
 
@@ -500,13 +512,25 @@ def step_joints(
                 parameters[_TEMPERATURE, i],
             )
 
-        bristle[i], friction = friction_step(
-            bristle[i],
-            q_next - angle[i],
+        change = q_next - angle[i]
+        limit = stribeck_torque(
             v_next,
             parameters[_COULOMB, i],
             parameters[_BREAKAWAY, i],
             parameters[_STRIBECK_VELOCITY, i],
+        )
+        if parameters[_DWELL_TORQUE, i] > 0.0:
+            # Fade and recovery both by their exact exponentials.
+            dwell[i] *= math.exp(-abs(change) / parameters[_DWELL_TRAVEL, i])
+            if parameters[_DWELL_RECOVERY, i] > 0.0:
+                back_to_rest = -math.expm1(-h / parameters[_DWELL_RECOVERY, i])
+                dwell[i] += (1.0 - dwell[i]) * back_to_rest
+            limit += parameters[_DWELL_TORQUE, i] * dwell[i]
+        bristle[i], friction = friction_step(
+            bristle[i],
+            change,
+            v_next,
+            limit,
             parameters[_STIFFNESS, i],
             parameters[_DAMPING, i],
         )

@@ -9,8 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from drake_affetto.errors import InputError, require, require_range
-from drake_affetto.pneumatics.chamber import ROWS, Row, chamber_flows
-from drake_affetto.pneumatics.chamber import opening_fraction
+from drake_affetto.pneumatics.chamber import (
+    ROWS,
+    Row,
+    chamber_flows,
+    opening_fraction,
+)
 from drake_affetto.resources import resolve
 
 DEFAULT_FILE = "package://drake_affetto/pneumatics.yaml"
@@ -40,6 +44,9 @@ class ActuatorClass:
         bristle_deflection: angle by which the joint gives before it breaks
             away, rad.
         bristle_relaxation: damping of the bristles over their stiffness, s.
+        dwell_torque: friction that is added after a long rest, N m.
+        dwell_travel: angle of travel over which that falls to 1/e, rad.
+        dwell_recovery: time in which it returns, s; 0: it does not.
     """
 
     torque_constant: float = 5e-6
@@ -58,6 +65,9 @@ class ActuatorClass:
     stribeck_velocity: float = 0.05
     bristle_deflection: float = 2e-3
     bristle_relaxation: float = 2e-3
+    dwell_torque: float = 0.0
+    dwell_travel: float = 4.0
+    dwell_recovery: float = 0.0
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that cannot be."""
@@ -72,6 +82,8 @@ class ActuatorClass:
             "regulator_gain",
             "coulomb_torque",
             "bristle_relaxation",
+            "dwell_torque",
+            "dwell_recovery",
         ):
             require_range(f"{where}.{field}", getattr(self, field), 0.0)
         require_range(f"{where}.critical_ratio", self.critical_ratio, 0.0, 0.99)
@@ -86,6 +98,7 @@ class ActuatorClass:
         require_range(
             f"{where}.stribeck_velocity", self.stribeck_velocity, 1e-4
         )
+        require_range(f"{where}.dwell_travel", self.dwell_travel, 1e-3)
         require_range(
             f"{where}.bristle_deflection", self.bristle_deflection, 1e-6, 0.1
         )
@@ -243,6 +256,9 @@ class PneumaticParameters:
             Row.STRIBECK_VELOCITY: actuator.stribeck_velocity,
             Row.STIFFNESS: stiffness,
             Row.DAMPING: stiffness * actuator.bristle_relaxation,
+            Row.DWELL_TORQUE: actuator.dwell_torque,
+            Row.DWELL_TRAVEL: actuator.dwell_travel,
+            Row.DWELL_RECOVERY: actuator.dwell_recovery,
             Row.SUPPLY: self.supply_pressure,
             Row.ATMOSPHERE: self.atmospheric_pressure,
             Row.TEMPERATURE: self.temperature,
