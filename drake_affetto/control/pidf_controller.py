@@ -217,7 +217,9 @@ class PidfController(LeafSystem):
         """
         zeros = np.zeros(self._n)
         context.SetDiscreteState(self._integral_index, zeros)
-        context.SetDiscreteState(self._demand_index, zeros + demand)
+        context.SetDiscreteState(
+            self._demand_index, np.broadcast_to(np.asarray(demand), zeros.shape)
+        )
         context.SetDiscreteState(self._opening_index, zeros)
 
     def set_integral(self, context: Context, pressure: ArrayLike) -> None:
