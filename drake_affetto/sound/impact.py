@@ -6,6 +6,7 @@ station the forces come from the simulated contact.
 
 import dataclasses
 
+import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -66,28 +67,34 @@ def contact_force(
         f"{len(hands)} hands",
         f"1 or {columns.shape[1]}",
     )
-    mass, spring, damper, stiffness, dissipation = np.array(
-        [dataclasses.astuple(one) for one in hands]
-    ).T
     step = float(times[-1] - times[0]) / (len(times) - 1)
-    velocity = np.gradient(columns, step, axis=0)
-    z = columns[0].copy()
-    v = np.zeros_like(z)
-    force = np.zeros_like(columns)
-    for i in range(len(columns)):
-        depth = np.maximum(-z, 0.0)
-        force[i] = np.maximum(stiffness * depth * (1.0 - dissipation * v), 0.0)
-        v += (
-            step
-            / mass
-            * (
-                spring * (columns[i] - z)
-                + damper * (velocity[i] - v)
-                + force[i]
-            )
+    numbers = np.array([dataclasses.astuple(one) for one in hands])
+    force = np.empty_like(columns)
+    for i in range(columns.shape[1]):
+        force[:, i] = _march(
+            np.ascontiguousarray(columns[:, i]),
+            np.gradient(columns[:, i], step),
+            step,
+            *numbers[min(i, len(hands) - 1)],
         )
-        z += step * v
     return force.reshape(path.shape)
+
+
+@numba.njit(cache=True)
+def _march(
+    target, velocity, step, mass, spring, damper, stiffness, dissipation
+):
+    """Force (T) of one hand on the surface."""
+    force = np.zeros(len(target))
+    z = target[0]
+    v = 0.0
+    for i in range(len(target)):
+        if z < 0.0:
+            force[i] = max(-stiffness * z * (1.0 - dissipation * v), 0.0)
+        pull = spring * (target[i] - z) + damper * (velocity[i] - v)
+        v += step / mass * (pull + force[i])
+        z += step * v
+    return force
 
 
 def stroke(

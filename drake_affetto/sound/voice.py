@@ -111,7 +111,7 @@ class BodyConfig:
 class HissConfig:
     """The noise of air jets in the valves."""
 
-    gain: float = 30.0
+    gain: float = 10.0
     """Sound pressure (rms) at the microphone by mass flow [Pa s/kg]."""
     low: float = 1500.0
     """Lower edge of the hiss's band [Hz]."""
