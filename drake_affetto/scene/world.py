@@ -309,16 +309,27 @@ def _inspector(plant: MultibodyPlant, context: Context) -> SceneGraphInspector:
     return query.inspector()
 
 
-def _collision_shapes(
-    plant: MultibodyPlant, context: Context, body: RigidBody, kind: type
+def _shapes(
+    plant: MultibodyPlant,
+    context: Context,
+    body: RigidBody,
+    kind: type,
+    role: Role = Role.kProximity,
+    name: str = "",
 ) -> list[tuple[RigidTransform, object]]:
+    """Poses and shapes of the body's geometries of that kind, role, name."""
     inspector = _inspector(plant, context)
     frame = plant.GetBodyFrameIdOrThrow(body.index())
-    return [
+    found = [
         (inspector.GetPoseInFrame(i), inspector.GetShape(i))
-        for i in inspector.GetGeometries(frame, Role.kProximity)
+        for i in inspector.GetGeometries(frame, role)
         if isinstance(inspector.GetShape(i), kind)
+        and inspector.GetName(i).endswith(name)
     ]
+    what = f"{role.name[1:].lower()} {kind.__name__} {name}".rstrip()
+    if not found:
+        raise InputError(f"{body.scoped_name()} has no {what}")
+    return found
 
 
 def table_extents(
@@ -330,7 +341,7 @@ def table_extents(
     square to the world.
     """
     body = plant.GetBodyByName("table_top")
-    X_TG, box = _collision_shapes(plant, context, body, Box)[0]
+    X_TG, box = _shapes(plant, context, body, Box)[0]
     X_WG = plant.EvalBodyPoseInWorld(context, body) @ X_TG
     half = 0.5 * np.abs(X_WG.rotation().matrix()) @ box.size()
     return X_WG.translation() - half, X_WG.translation() + half
@@ -339,15 +350,29 @@ def table_extents(
 def drum_radius(plant: MultibodyPlant, context: Context) -> float:
     """Radius [m] of the drum's shell, its widest part."""
     body = plant.GetBodyByName("shell")
-    shapes = _collision_shapes(plant, context, body, Cylinder)
+    shapes = _shapes(plant, context, body, Cylinder)
     return max(shape.radius() for _, shape in shapes)
 
 
 def hand_radius(plant: MultibodyPlant, context: Context) -> float:
     """Radius [m] of the soft right hand, about the palm's frame."""
     body = plant.GetBodyByName("right_hand")
-    shapes = _collision_shapes(plant, context, body, Sphere)
+    shapes = _shapes(plant, context, body, Sphere)
     return max(shape.radius() for _, shape in shapes)
+
+
+def marker_radius(plant: MultibodyPlant, context: Context) -> float:
+    """Radius [m] of the coloured disc on the drum's head."""
+    body = plant.GetFrameByName("marker").body()
+    shapes = _shapes(plant, context, body, Cylinder, Role.kPerception, "marker")
+    return shapes[0][1].radius()
+
+
+def mirror_size(plant: MultibodyPlant, context: Context) -> np.ndarray:
+    """Extents [m] of the glass along the mirror's x and y, (2,)."""
+    body = plant.GetFrameByName("mirror").body()
+    shapes = _shapes(plant, context, body, Box, Role.kPerception, "glass")
+    return shapes[0][1].size()[:2]
 
 
 def set_drum_position(
