@@ -99,7 +99,7 @@ class CameraConfig:
     rotation: list[float] = dataclasses.field(default_factory=_zeros)
     width: int = 320
     height: int = 240
-    fov_y: float = 0.9
+    fov_y: float = 0.8188
     lens: LensConfig | None = None
     near: float = 0.05
     far: float = 5.0
@@ -171,22 +171,25 @@ class MirrorConfig:
     Attributes:
         frame: the frame in the middle of its face, `model::frame`; z is the
             normal into the room.
-        width: size of the face along the frame's x [m].
-        height: size of the face along the frame's y [m].
+        width: size of the face along the frame's x [m]; by default that of
+            the visual box of its body.
+        height: size of the face along the frame's y [m]; by default likewise.
         tint: reflectance in red, green and blue.
         blur: standard deviation [pixels] of the reflection's blur.
     """
 
     frame: str = "mirror::mirror"
-    width: float = 0.42
-    height: float = 0.34
+    width: float | None = None
+    height: float | None = None
     tint: list[float] = dataclasses.field(default_factory=_ones)
     blur: float = 0.0
 
     def check(self, where: str) -> None:
         """Raises InputError if a value is out of range."""
-        require_range(f"{where}.width", self.width, 0.01, 10.0)
-        require_range(f"{where}.height", self.height, 0.01, 10.0)
+        for name in ("width", "height"):
+            size = getattr(self, name)
+            if size is not None:
+                require_range(f"{where}.{name}", size, 0.01, 10.0)
         require_vector(f"{where}.tint", self.tint, 3, 0.0, 1.0)
         require_range(f"{where}.blur", self.blur, 0.0, 20.0)
 

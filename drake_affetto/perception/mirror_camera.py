@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.geometry import (
+    Box,
     ClippingRange,
     ColorRenderCamera,
     FrameId,
@@ -287,10 +288,9 @@ class MirrorCamera(LeafSystem):
         return [
             (
                 RigidTransform(self._X_WM(context, query, index)),
-                mirror.width,
-                mirror.height,
+                *self._size(context, query, index),
             )
-            for index, mirror in enumerate(self._mirrors)
+            for index in range(len(self._mirrors))
         ]
 
     def set_effects(self, context: Context, effects: ImageEffects) -> None:
@@ -343,6 +343,24 @@ class MirrorCamera(LeafSystem):
         X_BM: RigidTransform = parameter.get_value()
         return (X_WB @ X_BM).GetAsMatrix4()
 
+    def _size(
+        self, context: Context, query: Any, index: int
+    ) -> tuple[float, float]:
+        """Width and height [m] of a mirror's face."""
+        config = self._mirrors[index]
+        if config.width is not None and config.height is not None:
+            return config.width, config.height
+        parameter: Any = context.get_abstract_parameter(1 + index)
+        size = _box_extents(
+            query, self._mirror_ids[index], parameter.get_value()
+        )
+        if size is None:
+            raise InputError(
+                f"mirrors[{index}].width is not given, and the body of "
+                f"{config.frame!r} has no visual box, or several"
+            )
+        return config.width or size[0], config.height or size[1]
+
     def _render(
         self,
         query: Any,
@@ -379,8 +397,7 @@ class MirrorCamera(LeafSystem):
                 self._pinhole,
                 X_WC,
                 X_WM,
-                mirror.width,
-                mirror.height,
+                *self._size(context, query, index),
                 self._config.near,
                 margin=math.ceil(3 * mirror.blur),
             )
@@ -467,6 +484,25 @@ def _frame_id(plant: MultibodyPlant, frame: Frame) -> FrameId:
             f"{frame.name()!r} cannot be seen"
         )
     return frame_id
+
+
+def _box_extents(
+    query: Any, frame_id: FrameId, X_BM: RigidTransform
+) -> tuple[float, float] | None:
+    """Extents along Mx and My of the one visual box of a body."""
+    inspector = query.inspector()
+    boxes = [
+        geometry
+        for geometry in inspector.GetGeometries(frame_id, Role.kPerception)
+        if isinstance(inspector.GetShape(geometry), Box)
+    ]
+    if len(boxes) != 1:
+        return None
+    X_MG = X_BM.inverse() @ inspector.GetPoseInFrame(boxes[0])
+    extents = (
+        np.abs(X_MG.rotation().matrix()) @ inspector.GetShape(boxes[0]).size()
+    )
+    return float(extents[0]), float(extents[1])
 
 
 def _labels(query: Any, frame_id: FrameId) -> list[int]:

@@ -398,6 +398,31 @@ def test_noise_depends_on_seed_and_time_alone(world):
     np.testing.assert_array_equal(port.Eval(sub).data, noisy)
 
 
+def test_a_mirrors_size_is_that_of_its_panel(world):
+    builder = DiagramBuilder()
+    plant, scene_graph = scene.add_scene(builder)
+    camera = MirrorCamera.AddToBuilder(
+        builder=builder,
+        plant=plant,
+        scene_graph=scene_graph,
+        config=CameraConfig(frame="camera"),
+        mirrors=[
+            MirrorConfig("mirror0::mirror"),
+            MirrorConfig("mirror0::mirror", height=0.1),
+            MirrorConfig("robot::base"),
+        ],
+    )
+    diagram = builder.Build()
+    context = camera.GetMyContextFromRoot(diagram.CreateDefaultContext())
+    with pytest.raises(InputError, match=r"mirrors\[2\]\.width"):
+        camera.mirrors(context)
+    camera._mirrors[2].width = camera._mirrors[2].height = 0.2
+    sizes = [size for _, *size in camera.mirrors(context)]
+    np.testing.assert_allclose(
+        sizes, [scene.MIRROR_SIZE, [scene.MIRROR_SIZE[0], 0.1], [0.2, 0.2]]
+    )
+
+
 def test_tint_and_blur_change_the_reflection_only():
     world = World()
     world.set(yaw=-0.3)
