@@ -18,7 +18,12 @@ from pydrake.geometry import (
     Sphere,
 )
 from pydrake.math import RigidTransform
-from pydrake.multibody.parsing import Parser
+from pydrake.multibody.parsing import (
+    LoadModelDirectives,
+    ModelDirectives,
+    Parser,
+    ProcessModelDirectives,
+)
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, RevoluteJoint, RigidBody
 from pydrake.systems.framework import Context
@@ -28,6 +33,34 @@ from drake_affetto.resources import configure_parser, resolve
 from drake_affetto.scene.kinematics import SerialChain
 
 _PLACEMENT = "drum_placement"
+
+
+@dataclasses.dataclass
+class FramePose:
+    """Where a frame of the directives is instead.
+
+    Attributes:
+        translation: x, y, z in the frame that the directives name as its
+            base [m].
+        rotation: roll, pitch, yaw about the base's axes [deg].
+    """
+
+    translation: list[float] = dataclasses.field(
+        default_factory=lambda: [0.0, 0.0, 0.0]
+    )
+    rotation: list[float] = dataclasses.field(
+        default_factory=lambda: [0.0, 0.0, 0.0]
+    )
+
+    def check(self, where: str) -> None:
+        """Raises InputError naming the first field that does not fit."""
+        for field, limit in (("translation", 10.0), ("rotation", 360.0)):
+            value = getattr(self, field)
+            require(
+                len(value) == 3, f"{where}.{field}", value, "three numbers"
+            )
+            for i, number in enumerate(value):
+                require_range(f"{where}.{field}[{i}]", number, -limit, limit)
 
 
 @dataclasses.dataclass
@@ -44,6 +77,8 @@ class WorldConfig:
             x and y [m].
         default_posture: joint -> angle [rad] of the default context; joints
             that are not named stand at zero.
+        frames: frame of the directives -> where it is instead, for instance
+            `affetto_base` or `mirror_pose`.
     """
 
     directives: str = "package://drake_affetto/scenes/drumming.dmd.yaml"
@@ -52,6 +87,7 @@ class WorldConfig:
         default_factory=lambda: [0.235, -0.09]
     )
     default_posture: dict[str, float] = dataclasses.field(default_factory=dict)
+    frames: dict[str, FramePose] = dataclasses.field(default_factory=dict)
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that does not fit."""
@@ -72,6 +108,8 @@ class WorldConfig:
             require_range(
                 f"{where}.default_posture.{name}", angle, -np.pi, np.pi
             )
+        for name, pose in self.frames.items():
+            pose.check(f"{where}.frames.{name}")
 
 
 def add_world(plant: MultibodyPlant, config: WorldConfig) -> None:
@@ -87,14 +125,14 @@ def add_world(plant: MultibodyPlant, config: WorldConfig) -> None:
     config.check("world")
     parser = Parser(plant)
     configure_parser(parser)
-    for path in (config.directives, config.drum):
-        if path == config.drum:
-            _require_scene(plant, config.directives)
-        if path.startswith("package://"):
-            models = parser.AddModelsFromUrl(path)
-        else:
-            models = parser.AddModels(path)
-    drum = models[0]
+    directives = LoadModelDirectives(str(resolve(config.directives)))
+    _move_frames(directives, config)
+    ProcessModelDirectives(directives, parser)
+    _require_scene(plant, config.directives)
+    if config.drum.startswith("package://"):
+        drum = parser.AddModelsFromUrl(config.drum)[0]
+    else:
+        drum = parser.AddModels(config.drum)[0]
     X_WT = plant.GetFrameByName("table_pose").GetFixedPoseInBodyFrame()
     placement = plant.AddFrame(
         FixedOffsetFrame(
@@ -108,6 +146,24 @@ def add_world(plant: MultibodyPlant, config: WorldConfig) -> None:
     check_posture(plant, config.default_posture, "world.default_posture")
     for name, angle in config.default_posture.items():
         get_joint(plant, name).set_default_angle(angle)
+
+
+def _move_frames(directives: ModelDirectives, config: WorldConfig) -> None:
+    """Puts the frames of `config.frames` elsewhere than the file has them."""
+    added = {
+        directive.add_frame.name: directive.add_frame
+        for directive in directives.directives
+        if directive.add_frame is not None
+    }
+    for name, pose in config.frames.items():
+        if name not in added:
+            raise InputError(
+                f"world.frames: {config.directives} has no frame {name!r}, "
+                f"expected one of {', '.join(added)}"
+            )
+        X_PF = added[name].X_PF
+        X_PF.translation = np.array(pose.translation, dtype=float)
+        X_PF.rotation.set_rpy_deg(np.array(pose.rotation, dtype=float))
 
 
 def _require_scene(plant: MultibodyPlant, uri: str) -> None:
