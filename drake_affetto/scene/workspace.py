@@ -282,7 +282,7 @@ def compute_workspace(
     heights = (hand - config.press, hand + config.hover)
     turn = palm.names.index(config.yaw_joint)
     reaches: list[Array] = []
-    strike = np.empty(0)
+    strike = np.full((*shape, len(config.active_joints)), np.nan)
     for change in (config.direct_posture, config.mirror_posture):
         rest = np.tile(_full(palm, default, change), (len(xy), 1))
         if change is config.direct_posture:

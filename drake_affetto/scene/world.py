@@ -8,8 +8,10 @@ context, i.e. `plant.GetMyContextFromRoot(root_context)`.
 from collections.abc import Mapping, Sequence
 import dataclasses
 import difflib
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydrake.geometry import (
     Box,
     Cylinder,
@@ -25,7 +27,12 @@ from pydrake.multibody.parsing import (
     ProcessModelDirectives,
 )
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, RevoluteJoint, RigidBody
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    ModelInstanceIndex,
+    RevoluteJoint,
+    RigidBody,
+)
 from pydrake.systems.framework import Context
 
 from drake_affetto.errors import InputError, require, require_range
@@ -56,9 +63,7 @@ class FramePose:
         """Raises InputError naming the first field that does not fit."""
         for field, limit in (("translation", 10.0), ("rotation", 360.0)):
             value = getattr(self, field)
-            require(
-                len(value) == 3, f"{where}.{field}", value, "three numbers"
-            )
+            require(len(value) == 3, f"{where}.{field}", value, "three numbers")
             for i, number in enumerate(value):
                 require_range(f"{where}.{field}[{i}]", number, -limit, limit)
 
@@ -164,6 +169,16 @@ def _move_frames(directives: ModelDirectives, config: WorldConfig) -> None:
         X_PF = added[name].X_PF
         X_PF.translation = np.array(pose.translation, dtype=float)
         X_PF.rotation.set_rpy_deg(np.array(pose.rotation, dtype=float))
+
+
+def _parse(parser: Parser, path: str) -> list[ModelInstanceIndex]:
+    try:
+        if path.startswith("package://"):
+            return parser.AddModelsFromUrl(path)
+        return parser.AddModels(path)
+    except RuntimeError as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"cannot read {path}: {reason}") from error
 
 
 def _require_scene(plant: MultibodyPlant, uri: str) -> None:
@@ -372,7 +387,7 @@ def _shapes(
     kind: type,
     role: Role = Role.kProximity,
     name: str = "",
-) -> list[tuple[RigidTransform, object]]:
+) -> list[tuple[RigidTransform, Any]]:
     """Poses and shapes of the body's geometries of that kind, role, name."""
     inspector = _inspector(plant, context)
     frame = plant.GetBodyFrameIdOrThrow(body.index())
@@ -431,33 +446,41 @@ def mirror_size(plant: MultibodyPlant, context: Context) -> np.ndarray:
     return shapes[0][1].size()[:2]
 
 
+def drum_limits(
+    plant: MultibodyPlant, context: Context
+) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest x, y [m] of a drum wholly on the table, each (2,)."""
+    lower, upper = table_extents(plant, context)
+    radius = drum_radius(plant, context)
+    return lower[:2] + radius, upper[:2] - radius
+
+
 def set_drum_position(
-    plant: MultibodyPlant, context: Context, xy: Sequence[float]
+    plant: MultibodyPlant, context: Context, xy: ArrayLike
 ) -> None:
     """Puts the drum on the table at world x, y [m].
 
     Raises:
         InputError: if the drum would not stand wholly on the table.
     """
-    xy = np.asarray(xy, dtype=float)
+    place = np.asarray(xy, dtype=float)
     require(
-        xy.shape == (2,) and bool(np.all(np.isfinite(xy))),
+        place.shape == (2,) and bool(np.all(np.isfinite(place))),
         "drum position",
-        xy.tolist(),
+        place.tolist(),
         "two finite numbers (x and y in metres)",
     )
-    lower, upper = table_extents(plant, context)
-    radius = drum_radius(plant, context)
-    low, high = lower[:2] + radius, upper[:2] - radius
+    low, high = drum_limits(plant, context)
     require(
-        bool(np.all(xy >= low) and np.all(xy <= high)),
+        bool(np.all(place >= low) and np.all(place <= high)),
         "drum position",
-        xy.tolist(),
+        place.tolist(),
         f"x from {low[0]:.3f} to {high[0]:.3f} and y from {low[1]:.3f} to "
         f"{high[1]:.3f} m (the drum stands wholly on the table)",
     )
     frame = plant.GetFrameByName(_PLACEMENT)
-    frame.SetPoseInParentFrame(context, RigidTransform([*xy, upper[2]]))
+    height = table_extents(plant, context)[1][2]
+    frame.SetPoseInParentFrame(context, RigidTransform([*place, height]))
 
 
 def get_drum_position(plant: MultibodyPlant, context: Context) -> np.ndarray:

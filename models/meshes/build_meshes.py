@@ -147,7 +147,10 @@ def sweep(
     path = np.gradient(middle[:, :3], axis=0)
     path /= np.linalg.norm(path, axis=1, keepdims=True)
     angle = np.linspace(0, np.pi / 2, caps + 1)[1:]
-    sections = [(*row[:3], row[3], row[4], t) for row, t in zip(middle, path)]
+    sections = [
+        (*row[:3], row[3], row[4], t)
+        for row, t in zip(middle, path, strict=True)
+    ]
     first, last = [], []
     for turn in angle:
         for end, index, out in ((0, 0, first), (1, -1, last)):
@@ -347,7 +350,7 @@ def bellows(height: float, ribs: int, a: float, b: float) -> Mesh:
     n = 4 * ribs
     z = np.linspace(-0.004, height + 0.004, n + 1)
     swell = 0.0035 * np.cos(2 * np.pi * ribs * np.arange(n + 1) / n)
-    rows = [(0, 0, h, a - s, b - s) for h, s in zip(z, swell)]
+    rows = [(0, 0, h, a - s, b - s) for h, s in zip(z, swell, strict=True)]
     return sweep(
         rows, around=24, along=n + 1, power=2.2, ends=(0.12, 0.12), caps=2
     )
