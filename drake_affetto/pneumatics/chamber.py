@@ -133,6 +133,10 @@ _EXPONENT = int(Row.EXPONENT)
 
 _HEAD = 2
 """Leading entries of the memory: whether it is filled, the line's head."""
+MASS_OFFSET = _HEAD
+"""Where in the memory the air's masses [kg] begin, 2 a joint."""
+DWELL_OFFSET_PER_JOINT = 7
+"""The dwells of friction begin at MASS_OFFSET + this times n."""
 
 
 def memory_size(n: int, time_step: float, dead_time: float) -> int:
