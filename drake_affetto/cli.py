@@ -23,6 +23,7 @@ from drake_affetto.errors import InputError
 # Name of a command → its module in drake_affetto, and what it does.
 COMMANDS: dict[str, tuple[str, str]] = {
     "diagram": ("diagram", "draw a station's systems and their connections"),
+    "look": ("studies.look", "draw what the robot's camera sees"),
 }
 
 _PROGRAM = "affetto"

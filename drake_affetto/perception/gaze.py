@@ -205,7 +205,9 @@ TAU_2 = 18
 STANDING = 19  # whether the joint stood at the latest image
 T_YAW = 20  # time of the latest image, marker or not
 Q_LAST = 21  # and the joint's angle then
-SIZE = 22
+SLOPE_X = 22  # change of the blob per turn of the joint, as seen on the way
+SLOPE_Y = 23
+SIZE = 24
 
 # An integral begins only near the goal [rad]; farther off the way is free.
 _NEAR = 0.15
@@ -230,6 +232,7 @@ class Gaze:
         """The state (SIZE,) before the first image."""
         x = np.zeros(SIZE)
         x[IMAGE_GAIN] = self.config.image_gain
+        x[SLOPE_X] = self.config.image_gain * self.view.focal
         return x
 
     def wants_image(self, x: Array, task: GazeTask) -> bool:
@@ -328,8 +331,17 @@ class Gaze:
             return
         x[MISSED] = 0
         still = self._is_still(x, blob, t_image)
+        self._learn_image_gain(x, blob, q)
         self._remember(x, blob, q, t_image)
-        self._count(x, t, task, near and still, blob[0], blob[1])
+        # Where the marker would be, were the joint exactly at the yaw.
+        self._count(
+            x,
+            t,
+            task,
+            near and still,
+            blob[0] + x[SLOPE_X] * behind,
+            blob[1] + x[SLOPE_Y] * behind,
+        )
 
     def _centre(
         self,
@@ -367,7 +379,9 @@ class Gaze:
         self._remember(x, blob, q, t_image)
         step = config.gain * way if not centred else way
         self._go_to(x, t, task, q + step + x[OFFSET], config.max_speed)
-        self._count(x, t, task, centred and still, blob[1], centred_yaw)
+        # Both as they would be, were the marker exactly in the middle.
+        y_centred = blob[1] + x[SLOPE_Y] * way
+        self._count(x, t, task, centred and still, y_centred, centred_yaw)
 
     # Steps
 
@@ -385,7 +399,7 @@ class Gaze:
         return speed <= self.config.still
 
     def _learn_image_gain(self, x: Array, blob: Array, q: float) -> None:
-        """Corrects k by what a clear turn did to the image."""
+        """Learns what a turn does to the image from a turn that was clear."""
         turn = q - x[Q_SEEN]
         if not math.isfinite(x[T_LAST]) or abs(turn) < 0.02:
             return
@@ -396,6 +410,13 @@ class Gaze:
         seen = (angle - before) / turn
         seen = min(max(seen, 0.4 * nominal), 2.5 * nominal)
         x[IMAGE_GAIN] += 0.5 * (seen - x[IMAGE_GAIN])
+        limit = 3.0 * self.view.focal * nominal
+        for index, now, last in (
+            (SLOPE_X, blob[0], x[X_LAST]),
+            (SLOPE_Y, blob[1], x[Y_LAST]),
+        ):
+            slope = min(max((now - last) / turn, -limit), limit)
+            x[index] += 0.5 * (slope - x[index])
 
     def _overcome_friction(
         self, x: Array, behind: float, elapsed: float, standing: bool

@@ -1,5 +1,6 @@
 """The geometry of seeing, as read from a plant: see `sight_model`."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -72,7 +73,7 @@ def calibrate_view(
     sight: SightModel,
     positions: np.ndarray,
     fixed_yaw: float | None = None,
-    mirror: Mirror | None = None,
+    mirrors: Sequence[Mirror] = (),
     margin: float = 0.05,
 ) -> BlobCalibration:
     """The box of pixels for a workspace of drum positions (n, 2).
@@ -82,7 +83,7 @@ def calibrate_view(
         positions: where the drum may stand, x and y in W [m].
         fixed_yaw: the yaw [rad] to look from; None to centre the marker, and
             then x spans the whole image.
-        mirror: in which the marker is seen, or None if directly.
+        mirrors: in which the marker may be seen.
         margin: what to add on each side, as a fraction of the box.
 
     Raises:
@@ -91,5 +92,5 @@ def calibrate_view(
     if fixed_yaw is None:
         _, pixels = sight.direct_pixels(positions)
         return calibrate(pixels, margin, sight.camera.width)
-    pixels = sight.fixed_yaw_pixels(positions, fixed_yaw, mirror)
+    pixels = sight.fixed_yaw_pixels(positions, fixed_yaw, mirrors)
     return calibrate(pixels, margin)

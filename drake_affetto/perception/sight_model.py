@@ -6,6 +6,7 @@ the yaw at which the marker is centred, the task parameters of the direct and
 of the mirrored view, and where the marker lies if it is seen at a pixel.
 """
 
+from collections.abc import Sequence
 import dataclasses
 
 import numpy as np
@@ -133,6 +134,25 @@ class SightModel:
             mirror,
         )
 
+    def image_of(
+        self, xy: Array, yaw: float, mirror: Mirror | None = None
+    ) -> Array:
+        """Pixels (n, 2) of points at the marker's level over xy (n, 2).
+
+        NaN where a point is behind the camera or not within the mirror.
+        """
+        p_W = self.marker(xy)
+        X_WC = self.camera_pose(yaw)
+        seen = p_W
+        if mirror is not None:
+            seen = optics.reflect_points(mirror.X_WM, p_W)
+        uv = self.camera.project(
+            optics.transform_points(optics.invert_pose(X_WC), seen)
+        )
+        if mirror is not None:
+            uv[~seen_in_mirror(X_WC[:3, 3], p_W, mirror)] = np.nan
+        return uv
+
     def centring_yaw(self, p_W: Array) -> Array:
         """The yaw [rad] at which points (..., 3) are at the image's middle u.
 
@@ -200,18 +220,32 @@ class SightModel:
         y = calibration.normalise(pixels)[:, 1]
         return np.stack([y, yaws], axis=-1)
 
+    def seen_by(
+        self, xy: Array, yaw: float, mirrors: Sequence[Mirror] = ()
+    ) -> tuple[int | None, MarkerView]:
+        """Where the marker shows largest: which mirror (None: directly).
+
+        That is the image that the blob sensor takes.
+        """
+        views: list[tuple[int | None, MarkerView]] = [
+            (None, self.view(xy, yaw))
+        ]
+        for index, mirror in enumerate(mirrors):
+            views.append((index, self.view(xy, yaw, mirror)))
+        return max(views, key=lambda item: item[1].whole * item[1].area)
+
     def fixed_yaw_pixels(
         self,
         xy: Array,
         yaw: float,
-        mirror: Mirror | None = None,
+        mirrors: Sequence[Mirror] = (),
         least: float = 1.0,
     ) -> Array:
         """Centroids uv (n, 2) from a fixed yaw; NaN where not wholly seen."""
         xy = np.atleast_2d(np.asarray(xy, dtype=float))
         pixels = np.full((len(xy), 2), np.nan)
         for i, place in enumerate(xy):
-            view = self.view(place, yaw, mirror)
+            _, view = self.seen_by(place, yaw, mirrors)
             if view.whole >= least and view.area > 0.0:
                 pixels[i] = view.uv
         return pixels
