@@ -149,7 +149,7 @@ class JointProblem:
         # 1 kPa per %/s, and per %/s²
         rate = 1e3 * K / (0.01 * self.angle_range)
         return [
-            FitParameter("area_ratio", "1", 0.7, 1.1, 0.95, False),
+            FitParameter("area_ratio", "1", 0.75, 1.0, 0.95, False),
             FitParameter("dead_volume", "m³", 0.3 * V, 4.0 * V, V),
             FitParameter(
                 "fill_conductance",
@@ -329,7 +329,7 @@ def _simulate(
     kP, kD, kI = law[0], law[1], law[2]
     stiffness, maximum = law[3], law[4]
     total = law[5]
-    sensor_steps = int(round(law[6] / h))
+    sensor_steps = round(law[6] / h)
 
     x = np.array([state[0, 0], state[0, 1]])
     if release <= 0.0:
@@ -349,7 +349,7 @@ def _simulate(
 
     k = 0
     row = 0
-    steps = int(math.ceil(t[N - 1] / h)) + 1
+    steps = math.ceil(t[N - 1] / h) + 1
     first = True
     for s in range(steps + 1):
         now = s * h
@@ -575,7 +575,7 @@ class JointSimulator:
             ],
             axis=1,
         )
-        out = _simulate(
+        out = _simulate(  # type: ignore[call-arg]
             parameters,
             joint,
             law,
@@ -644,13 +644,29 @@ class FitState:
         start_delays: start delay of each log by its name, s.
         stage: number of finished stages.
         cost: the last stage's mean squared weighted error.
+        profile: of the parameters in `PROFILED`, see `profile_fit`.
     """
 
     values: dict[str, float]
     start_delays: dict[str, float] = dataclasses.field(default_factory=dict)
     stage: int = 0
     cost: float = math.inf
+    profile: dict[str, list[float]] = dataclasses.field(default_factory=dict)
 
+
+PROFILED = (
+    "inertia",
+    "dead_volume",
+    "fill_conductance",
+    "coulomb_torque",
+    "dwell_travel",
+    "valve_lag",
+)
+"""Parameters whose neighbourhood is searched (`profile_fit`)."""
+
+_PROFILE_FACTOR = 2.0
+_PROFILE_RISE = 1.05
+_PROFILE_EVALUATIONS = 6
 
 STAGES = ("windows", "runs", "runs", "runs", "runs")
 """What each stage of a fit simulates."""
@@ -704,49 +720,80 @@ def _fit_stage(
     prior: float,
     on_evaluation: Callable[[int, float], None] | None,
 ) -> FitState:
-    parameters = simulator.problem.parameters()
-    values = dict(state.values)
     delays = dict(state.start_delays)
     whole_runs = STAGES[stage] == "runs"
-    if whole_runs:
+
+    def update_delays(values: dict[str, float]) -> None:
         for log in logs:
             delays[log.name] = simulator.estimate_start_delay(values, log)
+
+    def report(cost: float) -> None:
+        if on_evaluation is not None:
+            on_evaluation(stage, cost)
+
+    if whole_runs:
+        update_delays(state.values)
+    values, cost = _solve(
+        simulator,
+        logs,
+        state.values,
+        delays if whole_runs else None,
+        prior=prior,
+        step=_STEPS[stage],
+        evaluations=_EVALUATIONS[stage],
+        report=report,
+    )
+    if whole_runs:
+        update_delays(values)
+    return FitState(values, delays, stage + 1, cost)
+
+
+def _solve(
+    simulator: JointSimulator,
+    logs: Sequence[RobotLog],
+    values: dict[str, float],
+    delays: dict[str, float] | None,
+    *,
+    prior: float,
+    step: float,
+    evaluations: int,
+    report: Callable[[float], None],
+    fixed: str | None = None,
+) -> tuple[dict[str, float], float]:
+    """Least squares from `values`, on windows or (with `delays`) on runs.
+
+    Returns:
+        The values, and the mean squared weighted error without the prior.
+    """
+    everything = simulator.problem.parameters()
+    parameters = [p for p in everything if p.name != fixed]
     start = np.array([p.encode(values[p.name]) for p in parameters])
     centre = np.array([p.encode(p.start) for p in parameters])
+    pulled = np.zeros(start.size)
 
     def residuals(y: NDArray[np.float64]) -> NDArray[np.float64]:
-        trial = _decode(parameters, y - 1.0)
-        if whole_runs:
-            parts = [
-                _weighted(
-                    simulator.run(
-                        trial, log, start_delay=delays[log.name]
-                    ).errors(log)
-                )
-                for log in logs
-            ]
-        else:
+        trial = {**values, **_decode(parameters, y - 1.0)}
+        if delays is None:
             parts = _window_errors(simulator, trial, logs)
+        else:
+            parts = _run_errors(simulator, trial, logs, delays)
         errors = np.concatenate([part.ravel() for part in parts])
         errors /= math.sqrt(errors.size)
-        if on_evaluation is not None:
-            on_evaluation(stage, float(np.sum(errors**2)))
-        pull = prior * (y - 1.0 - centre)
-        return np.concatenate([errors, pull])
+        report(float(np.sum(errors**2)))
+        pulled[:] = prior * (y - 1.0 - centre)
+        return np.concatenate([errors, pulled])
 
     # Shifted by one: the optimiser's steps are relative to the size of y.
     solution = least_squares(
         residuals,
         1.0 + np.clip(start, 1e-3, 1.0 - 1e-3),
         bounds=(1.0, 2.0),
-        diff_step=_STEPS[stage],
-        max_nfev=_EVALUATIONS[stage],
+        diff_step=step,
+        max_nfev=evaluations,
     )
-    values = _decode(parameters, solution.x - 1.0)
-    if whole_runs:
-        for log in logs:
-            delays[log.name] = simulator.estimate_start_delay(values, log)
-    return FitState(values, delays, stage + 1, float(2.0 * solution.cost))
+    errors = solution.fun[: -start.size]
+    solved = {**values, **_decode(parameters, solution.x - 1.0)}
+    return solved, float(np.sum(errors**2))
 
 
 def _decode(
@@ -756,6 +803,21 @@ def _decode(
         p.name: p.decode(float(f))
         for p, f in zip(parameters, fractions, strict=True)
     }
+
+
+def _run_errors(
+    simulator: JointSimulator,
+    values: dict[str, float],
+    logs: Sequence[RobotLog],
+    delays: dict[str, float],
+) -> list[NDArray[np.float64]]:
+    """Weighted errors (N, 3) of each log, free-running in closed loop."""
+    return [
+        _weighted(
+            simulator.run(values, log, start_delay=delays[log.name]).errors(log)
+        )
+        for log in logs
+    ]
 
 
 def _window_errors(
@@ -783,13 +845,80 @@ def _window_errors(
     return parts
 
 
+def profile_fit(
+    problem: JointProblem,
+    logs: Sequence[RobotLog],
+    state: FitState,
+    *,
+    on_evaluation: Callable[[str, float], None] | None = None,
+    on_parameter: Callable[[FitState], None] | None = None,
+) -> FitState:
+    """Searches what the local slopes of a fit do not tell.
+
+    Each parameter in `PROFILED` is halved and doubled, all others are fitted
+    anew, and the mean squared error is compared with the fit's. Where it
+    hardly rises the others make up for it: the logs do not determine it.
+
+    Args:
+        problem: the joint.
+        logs: those of the fit.
+        state: a finished fit.
+        on_evaluation: called as (parameter, ratio) while it goes on.
+        on_parameter: called with the state after each parameter.
+
+    Returns:
+        The state with `profile` filled: for each parameter the ratios of the
+        errors at half and at double its value.
+    """
+    simulator = JointSimulator(problem)
+    base = float(
+        np.mean(
+            np.concatenate(
+                _run_errors(simulator, state.values, logs, state.start_delays)
+            )
+            ** 2
+        )
+    )
+    profile = dict(state.profile)
+    for name in PROFILED:
+        if name in profile:
+            continue
+
+        def report(cost: float, name: str = name) -> None:
+            if on_evaluation is not None:
+                on_evaluation(name, cost / base)
+
+        ratios = []
+        for factor in (1.0 / _PROFILE_FACTOR, _PROFILE_FACTOR):
+            start = {**state.values, name: factor * state.values[name]}
+            _, cost = _solve(
+                simulator,
+                logs,
+                start,
+                state.start_delays,
+                prior=0.0,
+                step=1e-2,
+                evaluations=_PROFILE_EVALUATIONS,
+                report=report,
+                fixed=name,
+            )
+            ratios.append(cost / base)
+        profile[name] = ratios
+        state = dataclasses.replace(state, profile=profile)
+        if on_parameter is not None:
+            on_parameter(state)
+    return state
+
+
 @dataclasses.dataclass(frozen=True)
 class Uncertainty:
     """How well the logs determine the parameters.
 
     Attributes:
-        std: standard deviation of each parameter, in its unit.
-        determined: whether the data say more of it than its bounds do.
+        std: standard deviation of each parameter, in its unit, from the
+            slopes at the fit alone.
+        determined: whether the data say more of it than its bounds do, and,
+            where it was profiled, another value makes the error grow.
         undetermined: the combinations that the data leave open: for each its
             standard deviation, in fractions of the bounds' distance, and the
             weights of the parameters in it.
@@ -814,16 +943,8 @@ def estimate_uncertainty(
 
     def errors(fractions: NDArray[np.float64]) -> NDArray[np.float64]:
         trial = _decode(parameters, fractions)
-        return np.concatenate(
-            [
-                _weighted(
-                    simulator.run(
-                        trial, log, start_delay=state.start_delays[log.name]
-                    ).errors(log)
-                ).ravel()
-                for log in logs
-            ]
-        )
+        parts = _run_errors(simulator, trial, logs, state.start_delays)
+        return np.concatenate([part.ravel() for part in parts])
 
     base = errors(centre)
     jacobian = np.empty((base.size, centre.size))
@@ -849,6 +970,8 @@ def estimate_uncertainty(
     determined = {
         p.name: bool(s < 0.2) for p, s in zip(parameters, spread, strict=True)
     }
+    for name, ratios in state.profile.items():
+        determined[name] &= min(ratios) > _PROFILE_RISE
     undetermined = []
     eigenvalues, vectors = np.linalg.eigh(covariance)
     for value, vector in zip(eigenvalues[::-1], vectors.T[::-1], strict=True):

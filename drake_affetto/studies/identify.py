@@ -27,6 +27,7 @@ from drake_affetto.output import (
 from drake_affetto.pneumatics.identification import (
     ANGLE_SCALE,
     JUDGED_FROM,
+    PROFILED,
     STAGES,
     FitState,
     JointProblem,
@@ -35,6 +36,7 @@ from drake_affetto.pneumatics.identification import (
     Uncertainty,
     estimate_uncertainty,
     fit_logs,
+    profile_fit,
 )
 from drake_affetto.pneumatics.parameters import load_parameters
 from drake_affetto.pneumatics.robot_log import (
@@ -196,8 +198,9 @@ def _fit(
     state = _read_state(folder / _STATE_FILE, key)
     if state is not None:
         print(
-            f"found {state.stage} of {len(STAGES)} stages done in {folder}, "
-            "going on from there"
+            f"found {state.stage + len(state.profile)} of "
+            f"{len(STAGES) + len(PROFILED)} stages done in {folder}, going on "
+            "from there"
         )
 
     def keep(reached: FitState) -> None:
@@ -213,9 +216,12 @@ def _fit(
         TimeElapsedColumn(),
         console=Console(),
     ) as progress:
-        done = 0 if state is None else state.stage
+        done = 0 if state is None else state.stage + len(state.profile)
         task = progress.add_task(
-            "fitting", total=len(STAGES), completed=done, note=""
+            "fitting",
+            total=len(STAGES) + len(PROFILED),
+            completed=done,
+            note="",
         )
         best = [float("inf")]
 
@@ -230,14 +236,30 @@ def _fit(
         def on_stage(reached: FitState) -> None:
             keep(reached)
             best[0] = float("inf")
-            progress.update(task, completed=reached.stage)
+            progress.update(
+                task, completed=reached.stage + len(reached.profile)
+            )
 
-        return fit_logs(
+        def on_profile(name: str, ratio: float) -> None:
+            progress.update(
+                task,
+                description=f"varying {name}",
+                note=f"squared error x {ratio:.2f}",
+            )
+
+        state = fit_logs(
             problem,
             logs,
             state=state,
             on_evaluation=on_evaluation,
             on_stage=on_stage,
+        )
+        return profile_fit(
+            problem,
+            logs,
+            state,
+            on_evaluation=on_profile,
+            on_parameter=on_stage,
         )
 
 
@@ -303,6 +325,11 @@ def _results(
             "std": uncertainty.std[p.name],
             "unit": p.unit,
             "determined": uncertainty.determined[p.name],
+            **(
+                {"squared_error_at_half_and_double": state.profile[p.name]}
+                if p.name in state.profile
+                else {}
+            ),
         }
         for p in problem.parameters()
     }
@@ -377,7 +404,7 @@ def actuator_yaml(
         if name in uncertainty.std:
             note = f"  # ± {uncertainty.std[name]:.2g}"
             if not uncertainty.determined[name]:
-                note += ", not determined"
+                note += " at best, not determined"
         lines.append(f"    {name}: {text}{note}")
     lines.append("# Of the joint and the robot's control stack:")
     units = {p.name: p.unit for p in problem.parameters()}
