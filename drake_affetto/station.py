@@ -35,6 +35,8 @@ from drake_affetto.perception.gaze import GazeMode, GazeTask
 from drake_affetto.perception.gaze_servo import GazeServo, gaze_view
 from drake_affetto.perception.mirror_camera import MirrorCamera
 from drake_affetto.pneumatics.actuation import PneumaticActuation
+from drake_affetto.pneumatics.chamber import Row
+from drake_affetto.pneumatics.parameters import resting_pressure
 from drake_affetto.scenario import Scenario
 from drake_affetto.scene import world
 from drake_affetto.skill.policy import SkillPolicy
@@ -184,8 +186,8 @@ class AffettoStation(Diagram):
     def reset(self, context: Context) -> None:
         """Puts robot, drum and all systems where a trial starts.
 
-        The robot rests at the start posture with its chambers at the resting
-        pressure; gravity will move it until its controller has settled. The
+        The robot rests at the start posture: the pressures in its chambers
+        carry gravity and the controller's integral asks for just these. The
         time is left as it is.
 
         Args:
@@ -198,6 +200,7 @@ class AffettoStation(Diagram):
             self._sub(self.plant, context),
             self.joints.names,
         )
+        self._balance_gravity(context)
         if self.scenario.motion_source == "skill":
             look = self.scenario.look
             self.gaze.set_task(
@@ -212,6 +215,30 @@ class AffettoStation(Diagram):
             self.dmp_source.set_start_posture(
                 self._sub(self.dmp_source, context), self.start_posture
             )
+
+    def _balance_gravity(self, context: Context) -> None:
+        """Pressures about their resting value that hold the posture."""
+        plant_context = self._sub(self.plant, context)
+        gravity = self.plant.GetVelocitiesFromArray(
+            self._robot,
+            self.plant.CalcGravityGeneralizedForces(plant_context),
+        )
+        torque = -gravity[self.joints.velocities]
+        actuation = self._sub(self.actuation, context)
+        parameters = self.actuation.get_parameters(actuation)
+        K_a, K_b = parameters[Row.K_A], parameters[Row.K_B]
+        ambient, supply = parameters[Row.ATMOSPHERE], parameters[Row.SUPPLY]
+        rest = resting_pressure(parameters)
+        # K_a (p_a - p_0) - K_b (p_b - p_0) = torque, with mean pressure `rest`.
+        unequal = (K_a - K_b) * (rest - ambient)
+        difference = 2.0 * (torque - unequal) / (K_a + K_b)
+        p_a = np.clip(rest + 0.5 * difference, ambient, supply)
+        p_b = np.clip(rest - 0.5 * difference, ambient, supply)
+        self.actuation.set_pressures(actuation, p_a, p_b)
+        if self.scenario.valve_source == "pidf":
+            controller = self._sub(self.controller, context)
+            self.controller.reset(controller, p_a - p_b)
+            self.controller.set_integral(controller, p_a - p_b)
 
     def set_drum_position(self, context: Context, xy: ArrayLike) -> None:
         """Puts the drum at xy (2,), m, on the table in the world frame.
@@ -335,10 +362,20 @@ class AffettoStation(Diagram):
             )
 
     def _add_sight(self, builder: DiagramBuilder) -> None:
+        # The renderers stand in a copy of the scene: a SceneGraph hands each
+        # new pose to all its render engines, which would triple the cost of
+        # every physics step. The copy is only asked when an image is.
+        seen = self.scene_graph.Clone()
+        seen.set_name("seen_scene")
+        builder.AddSystem(seen)
+        builder.Connect(
+            self.plant.get_geometry_pose_output_port(),
+            seen.get_source_pose_port(self.plant.get_source_id()),
+        )
         self.camera = MirrorCamera.AddToBuilder(
             builder=builder,
             plant=self.plant,
-            scene_graph=self.scene_graph,
+            scene_graph=seen,
             config=self.scenario.camera,
             mirrors=self.scenario.mirrors,
             render_config=self.scenario.rendering,
