@@ -1,5 +1,22 @@
 """The parameterised skill (an ELM) and its transfer to a new view."""
 
+from drake_affetto.skill.adapters import input_jacobian
 from drake_affetto.skill.elm import ElmRegressor
+from drake_affetto.skill.mappings import Affine, Domain, Mapping, Similarity
+from drake_affetto.skill.transfer import (
+    Start,
+    TransferRegressor,
+    loo_covariance,
+)
 
-__all__ = ["ElmRegressor"]
+__all__ = [
+    "Affine",
+    "Domain",
+    "ElmRegressor",
+    "Mapping",
+    "Similarity",
+    "Start",
+    "TransferRegressor",
+    "input_jacobian",
+    "loo_covariance",
+]

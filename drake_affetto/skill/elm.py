@@ -53,7 +53,10 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         input_weights_: (d, H), V.
         biases_: (H,), b.
         coef_: (H, F), or (H,) if y was one-dimensional: W.
+        input_center_, input_gain_: (d,), x̄ = (x - center) * gain.
         n_samples_seen_: how many samples have been learned.
+        input_mean_, input_covariance_: (d,), (d, d), of their inputs.
+        input_low_, input_high_: (d,), least and greatest of their inputs.
         n_features_in_: d.
     """
 
@@ -132,7 +135,7 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         phi = self.hidden(X)
         slope = phi * (1.0 - phi)
         # The weights by raw inputs: the scaling is part of the derivative.
-        weights = self.input_weights_ * self._input_gain[:, None]
+        weights = self.input_weights_ * self.input_gain_[:, None]
         if self._y_ndim == 1:
             return (slope * self.coef_) @ weights.T
         jacobian = np.empty((len(slope), self.coef_.shape[1], len(weights)))
@@ -186,7 +189,7 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
     def _begin(self, n_features: int, y: FloatArray) -> None:
         """Draws the hidden layer and lays out an empty memory."""
         self._check_parameters()
-        self._input_center, self._input_gain = _scaling(
+        self.input_center_, self.input_gain_ = _scaling(
             self.input_range, n_features
         )
         random = check_random_state(self.random_state)
@@ -203,6 +206,10 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         )
         self._moment = np.zeros((self.n_hidden, n_outputs), order="F")
         self.n_samples_seen_ = 0
+        self.input_mean_ = np.zeros(n_features)
+        self.input_covariance_ = np.zeros((n_features, n_features))
+        self.input_low_ = np.full(n_features, np.inf)
+        self.input_high_ = np.full(n_features, -np.inf)
 
     def _check_parameters(self) -> None:
         integer = isinstance(self.n_hidden, (int, np.integer))
@@ -223,7 +230,7 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
                 )
 
     def _activate(self, X: FloatArray) -> FloatArray:
-        scaled = (X - self._input_center) * self._input_gain
+        scaled = (X - self.input_center_) * self.input_gain_
         return expit(scaled @ self.input_weights_ + self.biases_)
 
     def _learn(self, X: FloatArray, y: FloatArray) -> None:
@@ -231,8 +238,25 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         for begin in range(0, len(X), _CHUNK):
             rows = slice(begin, begin + _CHUNK)
             self._absorb(self._activate(X[rows]), y[rows])
-        self.n_samples_seen_ += len(X)
+        self._note_inputs(X)
         self._coef = None
+
+    def _note_inputs(self, X: FloatArray) -> None:
+        """Keeps the moments and limits of the inputs learned so far."""
+        known, new = self.n_samples_seen_, len(X)
+        total = known + new
+        mean = X.mean(axis=0)
+        apart = mean - self.input_mean_
+        centered = X - mean
+        self.input_covariance_ = (
+            known * self.input_covariance_
+            + centered.T @ centered
+            + (known * new / total) * np.outer(apart, apart)
+        ) / total
+        self.input_mean_ = self.input_mean_ + (new / total) * apart
+        self.input_low_ = np.minimum(self.input_low_, X.min(axis=0))
+        self.input_high_ = np.maximum(self.input_high_, X.max(axis=0))
+        self.n_samples_seen_ = total
 
     def _absorb(self, phi: FloatArray, y: FloatArray) -> None:
         """Updates R and z by the rows phi (N, H) and y (N, F)."""
@@ -253,7 +277,7 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         self._root, reflectors, factors, _ = dtpqrt(
             0, block, self._root, np.asfortranarray(phi), overwrite_a=True
         )
-        self._moment, _, _ = dtpmqrt(
+        moment, _, _ = dtpmqrt(
             0,
             reflectors,
             factors,
@@ -262,6 +286,10 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
             trans="T",
             overwrite_a=True,
         )
+        # LAPACK gives a single column strides that a copy would not have.
+        if moment.shape[1] == 1:
+            moment = moment[:, 0].copy().reshape(-1, 1)
+        self._moment = moment
 
     def _read_out(self) -> FloatArray:
         if self._coef is None:

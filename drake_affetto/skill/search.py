@@ -1,0 +1,301 @@
+"""The cost of a map, and searches for its parameters.
+
+What `TransferRegressor` minimises, with its derivatives, for many parameters
+at once; and two ways to minimise it.
+"""
+
+from collections.abc import Callable
+import dataclasses
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from drake_affetto.skill.adapters import SourceModel
+from drake_affetto.skill.mappings import Affine, Domain, Mapping
+
+FloatArray = NDArray[np.float64]
+
+# Parameters (S, P) to cost (S,), half its gradient (S, P), and half its
+# Gauss-Newton Hessian (S, P, P).
+Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Prior:
+    """What is expected of h, in units of the squared error.
+
+    Attributes:
+        domain: in which the skill was learned.
+        inside: weight of the squared distance of each h(x) from it.
+        moments: weight of each point in a comparison of mean and covariance.
+        shape: weight of an affine map's distortion.
+        scale: by which H is divided before its distortion is judged.
+    """
+
+    domain: Domain
+    inside: float
+    moments: float
+    shape: float
+    scale: float
+
+
+class Objective:
+    """The cost of parameters, its gradient and Gauss-Newton curvature.
+
+    cost = Σ_i ‖f(h(x_i)) - y_i‖² + α ‖p‖² + prior
+    """
+
+    def __init__(
+        self,
+        source: SourceModel,
+        mapping: Mapping,
+        X: FloatArray,
+        y: FloatArray,
+        unlabelled: FloatArray,
+        alpha: float,
+        prior: Prior | None,
+    ) -> None:
+        self._source = source
+        self._mapping = mapping
+        self._labelled = len(X)
+        self._points = np.concatenate([X, unlabelled]) if prior else X
+        self._y = y
+        self._alpha = alpha
+        self._prior = prior
+
+    def __call__(
+        self, parameters: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """For parameters (S, P): cost (S,), half its gradient (S, P), and
+        half its Gauss-Newton Hessian (S, P, P)."""
+        mapping, n = self._mapping, self._labelled
+        moved = mapping.apply_many(parameters, self._points)
+        slope = mapping.derivative_many(parameters, self._points)
+        n_starts, _, d = moved.shape
+
+        value, jacobian = self._source.evaluate(moved[:, :n].reshape(-1, d))
+        residual = value.reshape(n_starts, n, -1) - self._y
+        jacobian = jacobian.reshape(n_starts, n, -1, d)
+        cost = np.einsum("sno,sno->s", residual, residual)
+        # The curvature and gradient by each z, then by the parameters.
+        transposed = np.swapaxes(jacobian, 2, 3)
+        pull = (transposed @ residual[..., None])[..., 0]
+        bend = transposed @ jacobian
+
+        if self._prior is not None:
+            extra, all_pull, all_bend = self._inside(moved)
+            all_pull[:, :n] += pull
+            all_bend[:, :n] += bend
+            cost = cost + extra
+            pull, bend = all_pull, all_bend
+        gradient = np.einsum("snd,sndp->sp", pull, slope)
+        bent = bend @ slope
+        size = slope.shape[-1]
+        flat = (n_starts, -1, size)
+        curvature = np.swapaxes(slope.reshape(flat), 1, 2) @ bent.reshape(flat)
+
+        if self._prior is not None:
+            for weight, term in (
+                (self._prior.moments, self._moments),
+                (self._prior.shape, self._distortion),
+            ):
+                if weight > 0.0:
+                    residual, change = term(parameters, moved, slope)
+                    transposed = np.swapaxes(change, 1, 2)
+                    cost = cost + weight * np.sum(residual**2, axis=1)
+                    more = weight * transposed @ residual[..., None]
+                    gradient += more[..., 0]
+                    curvature += weight * transposed @ change
+        if self._alpha > 0.0:
+            cost = cost + self._alpha * np.sum(parameters**2, axis=1)
+            gradient += self._alpha * parameters
+            curvature[:, range(size), range(size)] += self._alpha
+        return cost, gradient, curvature
+
+    def _inside(
+        self, moved: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The squared distance of each z from the domain's box."""
+        assert self._prior is not None
+        domain, weight = self._prior.domain, self._prior.inside
+        unit = domain.deviation
+        outside = moved - np.clip(moved, domain.low, domain.high)
+        outside /= unit
+        cost = weight * np.einsum("snd,snd->s", outside, outside)
+        pull = weight * outside / unit
+        bend = np.zeros((*moved.shape, moved.shape[-1]))
+        diagonal = range(moved.shape[-1])
+        bend[..., diagonal, diagonal] = weight * (outside != 0.0) / unit**2
+        return cost, pull, bend
+
+    def _moments(
+        self, parameters: FloatArray, moved: FloatArray, slope: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """How unlikely mean and covariance of the z are in the domain.
+
+        Returns:
+            Residuals (S, R) and their derivatives (S, R, P).
+        """
+        assert self._prior is not None
+        domain = self._prior.domain
+        unit = domain.deviation
+        d, m = unit.size, moved.shape[1]
+        z = (moved - domain.mean) / unit
+        dz = slope / unit[:, None]
+        mean = z.mean(axis=1)
+        z = z - mean[:, None]
+        goal = domain.covariance / np.outer(unit, unit)
+        residuals = [mean]
+        changes = [dz.mean(axis=1)]
+        for a in range(d):
+            for b in range(a, d):
+                # A variance is twice as uncertain as a covariance.
+                scale = math.sqrt(0.5) if a == b else 1.0
+                product = (z[:, :, a] * z[:, :, b]).mean(axis=1)
+                change = np.einsum("sm,smp->sp", z[:, :, a], dz[:, :, b])
+                change += np.einsum("sm,smp->sp", z[:, :, b], dz[:, :, a])
+                residuals.append(scale * (product - goal[a, b])[:, None])
+                changes.append(scale * change[:, None] / m)
+        # Means over m points, and as certain as that.
+        root = math.sqrt(m)
+        return (
+            root * np.concatenate(residuals, axis=1),
+            root * np.concatenate(changes, axis=1),
+        )
+
+    def _distortion(
+        self, parameters: FloatArray, moved: FloatArray, slope: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """How far an affine map is from a similarity: HᵀH from a multiple of 1.
+
+        Returns:
+            Residuals (S, R) and their derivatives (S, R, P).
+        """
+        assert self._prior is not None
+        assert isinstance(self._mapping, Affine)
+        n_in = self._points.shape[1]
+        linear, _ = self._mapping.split(parameters, n_in)
+        linear = linear / self._prior.scale
+        n_starts, n_out, _ = linear.shape
+        residuals = []
+        changes = []
+        for a in range(1, n_in):
+            # Each column as long as the one before it, and at right angles to
+            # all those.
+            for b in range(a):
+                change = np.zeros_like(linear)
+                first, second = linear[:, :, b], linear[:, :, a]
+                change[:, :, b] = 2.0 * second
+                change[:, :, a] = 2.0 * first
+                residuals.append(2.0 * np.sum(first * second, axis=1))
+                changes.append(change)
+            change = np.zeros_like(linear)
+            before, own = linear[:, :, a - 1], linear[:, :, a]
+            change[:, :, a - 1] = 2.0 * before
+            change[:, :, a] = -2.0 * own
+            residuals.append(np.sum(before**2 - own**2, axis=1))
+            changes.append(change)
+        flat = np.stack(changes, axis=1).reshape(n_starts, len(changes), -1)
+        flat = np.pad(flat / self._prior.scale, ((0, 0), (0, 0), (0, n_out)))
+        return np.stack(residuals, axis=1), flat
+
+
+class Minima(NamedTuple):
+    parameters: FloatArray  # (S, P)
+    cost: FloatArray  # (S,)
+    gradient: FloatArray  # (S, P), half of it
+    curvature: FloatArray  # (S, P, P), half of it
+    converged: NDArray[np.bool_]  # (S,)
+    iterations: int  # of the longest search
+
+
+def levenberg_marquardt(
+    objective: Evaluate,
+    starts: FloatArray,
+    *,
+    max_iter: int,
+    tol: float,
+) -> Minima:
+    """Minimises from all starts (S, P) at once.
+
+    Each start has its own damping, after Nielsen; those that have converged
+    rest. A start has converged once a step changes its cost by less than tol
+    times the cost.
+    """
+    parameters = np.array(starts, dtype=float)
+    cost, gradient, curvature = objective(parameters)
+    n_starts, size = parameters.shape
+    diagonal = range(size)
+    damping = np.full(n_starts, 1e-2)
+    growth = np.full(n_starts, 2.0)
+    converged = np.zeros(n_starts, dtype=bool)
+    floor = 1e-12
+    iterations = 0
+    for iterations in range(max_iter + 1):
+        index = np.flatnonzero(~converged)
+        if index.size == 0 or iterations == max_iter:
+            break
+        here = curvature[index]
+        scale = here[:, diagonal, diagonal]
+        scale = np.maximum(scale, floor * scale.max(axis=1, keepdims=True))
+        scale = np.maximum(scale, 1e-300)
+        damped = here.copy()
+        damped[:, diagonal, diagonal] += damping[index, None] * scale
+        step = -np.linalg.solve(damped, gradient[index][..., None])[..., 0]
+        expected = np.sum(
+            step * (damping[index, None] * scale * step - gradient[index]),
+            axis=1,
+        )
+        trial = parameters[index] + step
+        new_cost, new_gradient, new_curvature = objective(trial)
+        gain = cost[index] - new_cost
+        better = gain > 0.0
+        small = (expected <= tol * cost[index]) | (damping[index] > 1e12)
+        kept = index[better]
+        parameters[kept] = trial[better]
+        cost[kept] = new_cost[better]
+        gradient[kept] = new_gradient[better]
+        curvature[kept] = new_curvature[better]
+        ratio = gain / np.maximum(expected, 1e-300)
+        shrink = np.maximum(1.0 / 9.0, 1.0 - (2.0 * ratio - 1.0) ** 3)
+        damping[index] *= np.where(better, shrink, growth[index])
+        damping[index] = np.maximum(damping[index], 1e-12)
+        growth[index] = np.where(better, 2.0, 2.0 * growth[index])
+        converged[index] = small
+    return Minima(parameters, cost, gradient, curvature, converged, iterations)
+
+
+def bfgs(
+    objective: Evaluate,
+    starts: FloatArray,
+    *,
+    max_iter: int,
+    tol: float,
+) -> Minima:
+    """Minimises from one start after another by BFGS, as in the paper."""
+
+    def cost_and_gradient(p: FloatArray) -> tuple[float, FloatArray]:
+        cost, gradient, _ = objective(p[None])
+        return float(cost[0]), 2.0 * gradient[0]
+
+    ends = []
+    converged = []
+    iterations = 0
+    for start in starts:
+        found = minimize(
+            cost_and_gradient,
+            start,
+            jac=True,
+            method="BFGS",
+            options={"maxiter": max_iter, "gtol": tol},
+        )
+        ends.append(found.x)
+        converged.append(found.nit < max_iter)
+        iterations = max(iterations, int(found.nit))
+    parameters = np.array(ends)
+    return Minima(
+        parameters, *objective(parameters), np.array(converged), iterations
+    )
