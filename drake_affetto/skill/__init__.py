@@ -3,6 +3,7 @@
 from drake_affetto.skill.adapters import input_jacobian
 from drake_affetto.skill.elm import ElmRegressor
 from drake_affetto.skill.mappings import Affine, Domain, Mapping, Similarity
+from drake_affetto.skill.schemes import SCHEMES, make_scheme
 from drake_affetto.skill.transfer import (
     Start,
     TransferRegressor,
@@ -10,6 +11,7 @@ from drake_affetto.skill.transfer import (
 )
 
 __all__ = [
+    "SCHEMES",
     "Affine",
     "Domain",
     "ElmRegressor",
@@ -19,4 +21,5 @@ __all__ = [
     "TransferRegressor",
     "input_jacobian",
     "loo_covariance",
+    "make_scheme",
 ]
