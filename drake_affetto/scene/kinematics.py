@@ -87,7 +87,7 @@ def solve_position(
     *,
     start: Array | None = None,
     margin: float = 0.0,
-    iterations: int = 200,
+    iterations: int = 120,
     damping: float = 0.01,
     comfort: float = 0.05,
 ) -> tuple[Array, Array]:

@@ -84,6 +84,6 @@ def on_panel(
     depth = (p_W - X_WM[:3, 3]) @ normal
     with np.errstate(divide="ignore", invalid="ignore"):
         hit = p_eye + ray * (height / -(ray @ normal))[..., None]
-    planar = (hit - X_WM[:3, 3]) @ X_WM[:3, :2]
+        planar = (hit - X_WM[:3, 3]) @ X_WM[:3, :2]
     within = np.all(np.abs(planar) <= 0.5 * np.asarray(size) - margin, axis=-1)
     return within & (height > 0) & (depth > 0)

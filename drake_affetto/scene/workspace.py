@@ -127,7 +127,7 @@ class Workspace:
             from the direct posture turned to the drum.
         reach_mirror: the same, starting from the mirror posture.
         sees: the whole marker is in the image, before and after the upper
-            body has turned to it.
+            body has turned to it; then the mirror is out of the image.
         sees_mirror: the whole marker is in the mirror's image, large enough.
         yaw: (nx, ny) yaw [rad] that centres the marker; NaN if none does.
         pixels: (nx, ny, 2) the marker's centre in the image, once centred.
@@ -183,6 +183,14 @@ def _centring_yaw(
     return np.where(bracketed, 0.5 * (low + high), np.nan)
 
 
+def _panel(X_WM: Array, size: Array, frame: float = 0.015) -> Array:
+    """Points (k, 3) in world all over a mirror and its frame."""
+    half = 0.5 * size + frame
+    u, v = np.meshgrid(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21))
+    flat = np.stack([half[0] * u, half[1] * v, 0 * u], axis=-1).reshape(-1, 3)
+    return flat @ X_WM[:3, :3].T + X_WM[:3, 3]
+
+
 def _collides(plant: MultibodyPlant, context: Context) -> bool:
     """Whether anything but the hand and the drum's head touches."""
     query = plant.get_geometry_query_input_port().Eval(context)
@@ -232,6 +240,9 @@ def compute_workspace(
     }
 
     # Sight
+    X_WM = plant.GetFrameByName("mirror").CalcPoseInWorld(context)
+    X_WM = X_WM.GetAsMatrix4()
+    panel = world.mirror_size(plant, context)
     eye = world.serial_chain(plant, "eye_camera")
     view = View(config.width, config.height, config.fov_y)
     rim = disc(marker, world.marker_radius(plant, context))
@@ -249,14 +260,12 @@ def compute_workspace(
         in_range
         & view.inside(view.project(X_WC, rim), config.edge).all(axis=-1)
         & view.inside(view.project(eye.pose(posture), rim)).all(axis=-1)
+        & ~view.inside(view.project(X_WC, _panel(X_WM, panel))).any(axis=-1)
     )
     X_WC = eye.pose(_full(eye, default, config.mirror_posture))
-    X_WM = plant.GetFrameByName("mirror").CalcPoseInWorld(context)
-    X_WM = X_WM.GetAsMatrix4()
     image = reflect(X_WM, rim)
     rim_pixels = view.project(X_WC, image)
     area = polygon_area(rim_pixels)
-    panel = world.mirror_size(plant, context)
     with np.errstate(invalid="ignore"):
         sees_mirror = (
             view.inside(rim_pixels, config.edge).all(axis=-1)

@@ -5,7 +5,8 @@ is repeated in code. All functions that take a `context` want the plant's own
 context, i.e. `plant.GetMyContextFromRoot(root_context)`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+import contextlib
 import dataclasses
 import difflib
 from typing import Any
@@ -29,7 +30,6 @@ from pydrake.multibody.parsing import (
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
-    ModelInstanceIndex,
     RevoluteJoint,
     RigidBody,
 )
@@ -130,14 +130,16 @@ def add_world(plant: MultibodyPlant, config: WorldConfig) -> None:
     config.check("world")
     parser = Parser(plant)
     configure_parser(parser)
-    directives = LoadModelDirectives(str(resolve(config.directives)))
-    _move_frames(directives, config)
-    ProcessModelDirectives(directives, parser)
+    with _reading(config.directives):
+        directives = LoadModelDirectives(str(resolve(config.directives)))
+        _move_frames(directives, config)
+        ProcessModelDirectives(directives, parser)
     _require_scene(plant, config.directives)
-    if config.drum.startswith("package://"):
-        drum = parser.AddModelsFromUrl(config.drum)[0]
-    else:
-        drum = parser.AddModels(config.drum)[0]
+    with _reading(config.drum):
+        drum = parser.AddModels(str(resolve(config.drum)))[0]
+    for name in ("head_center", "marker"):
+        if not plant.HasFrameNamed(name, drum):
+            raise InputError(f"{config.drum} has no frame {name}")
     X_WT = plant.GetFrameByName("table_pose").GetFixedPoseInBodyFrame()
     placement = plant.AddFrame(
         FixedOffsetFrame(
@@ -171,14 +173,14 @@ def _move_frames(directives: ModelDirectives, config: WorldConfig) -> None:
         X_PF.rotation.set_rpy_deg(np.array(pose.rotation, dtype=float))
 
 
-def _parse(parser: Parser, path: str) -> list[ModelInstanceIndex]:
+@contextlib.contextmanager
+def _reading(uri: str) -> Iterator[None]:
+    """Tells what Drake cannot read in one line that names the file."""
     try:
-        if path.startswith("package://"):
-            return parser.AddModelsFromUrl(path)
-        return parser.AddModels(path)
+        yield
     except RuntimeError as error:
         reason = " ".join(str(error).split())
-        raise InputError(f"cannot read {path}: {reason}") from error
+        raise InputError(f"cannot read {uri}: {reason}") from error
 
 
 def _require_scene(plant: MultibodyPlant, uri: str) -> None:

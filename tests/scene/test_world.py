@@ -1,0 +1,256 @@
+"""Drum placement, postures, joint selection, and errors that name things."""
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+import pytest
+
+from drake_affetto.errors import InputError
+from drake_affetto.scene import world
+
+ACTIVE = [
+    "waist_roll",
+    "waist_pitch",
+    "waist_yaw",
+    "right_shoulder_elevation",
+    "right_shoulder_abduction",
+    "right_shoulder_flexion",
+    "right_elbow_rotation",
+    "right_elbow_flexion",
+]
+
+
+def test_the_drum_stands_where_it_is_put(scene):
+    default = world.get_drum_position(scene.plant, scene.context)
+    assert default == pytest.approx(world.WorldConfig().drum_position)
+    for xy in ([0.2, -0.15], [0.3, 0.0]):
+        world.set_drum_position(scene.plant, scene.context, xy)
+        assert world.get_drum_position(
+            scene.plant, scene.context
+        ) == pytest.approx(xy)
+        marker = world.marker_position(scene.plant, scene.context)
+        assert marker == pytest.approx([*xy, 0.041])
+        # The model stands on the table, neither in it nor above it.
+        shell = scene.plant.GetFrameByName("shell")
+        foot = shell.CalcPoseInWorld(scene.context).translation()
+        top = world.table_extents(scene.plant, scene.context)[1][2]
+        assert foot == pytest.approx([*xy, top])
+
+
+def test_a_new_context_does_not_remember_the_drum(scene):
+    world.set_drum_position(scene.plant, scene.context, [0.3, 0.0])
+    other = scene.plant.GetMyContextFromRoot(
+        scene.diagram.CreateDefaultContext()
+    )
+    assert world.get_drum_position(scene.plant, other) == pytest.approx(
+        world.WorldConfig().drum_position
+    )
+
+
+@pytest.mark.parametrize(
+    ("xy", "told"),
+    [
+        ([0.1, 0.0], r"0\.1, 0\.0.*x from 0\.154"),
+        ([0.3, 0.45], "wholly on the table"),
+        ([0.3], "two finite numbers"),
+        ([0.3, np.nan], "nan.*two finite numbers"),
+    ],
+)
+def test_a_drum_that_would_fall_is_refused(scene, xy, told):
+    before = world.get_drum_position(scene.plant, scene.context)
+    with pytest.raises(InputError, match=told):
+        world.set_drum_position(scene.plant, scene.context, xy)
+    after = world.get_drum_position(scene.plant, scene.context)
+    assert np.all(after == before)
+
+
+def test_the_limits_of_the_drum_are_just_on_the_table(scene):
+    low, high = world.drum_limits(scene.plant, scene.context)
+    lower, upper = world.table_extents(scene.plant, scene.context)
+    radius = world.drum_radius(scene.plant, scene.context)
+    assert low - radius == pytest.approx(lower[:2])
+    assert high + radius == pytest.approx(upper[:2])
+    for corner in (low, high):
+        world.set_drum_position(scene.plant, scene.context, corner)
+
+
+def test_sizes_are_read_from_the_models(scene):
+    assert world.marker_radius(scene.plant, scene.context) == 0.030
+    assert world.hand_radius(scene.plant, scene.context) == 0.028
+    size = world.mirror_size(scene.plant, scene.context)
+    assert size == pytest.approx([0.50, 0.38])
+
+
+def test_the_palm_hovers_at_the_start(scene):
+    palm = scene.plant.GetFrameByName("right_palm")
+    X_WP = palm.CalcPoseInWorld(scene.context)
+    head = world.head_center_position(scene.plant, scene.context)
+    hand = world.hand_radius(scene.plant, scene.context)
+    assert X_WP.translation()[2] - hand - head[2] >= 0.07
+    assert X_WP.rotation().matrix()[2, 2] < -0.85  # palm down
+    away = np.linalg.norm(X_WP.translation()[:2] - head[:2])
+    assert away < 0.15
+
+
+def test_postures_are_set_and_read_back(scene):
+    posture = {"waist_yaw": 0.2, "left_elbow_flexion": 1.0}
+    joint = world.get_joint(scene.plant, "waist_yaw")
+    joint.set_angular_rate(scene.context, 3.0)
+    before = world.get_posture(scene.plant, scene.context)
+    world.set_posture(scene.plant, scene.context, posture)
+    after = world.get_posture(scene.plant, scene.context)
+    assert after == {**before, **posture}
+    assert joint.get_angular_rate(scene.context) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("posture", "told"),
+    [
+        ({"waist_jaw": 0.1}, "no joint 'waist_jaw'; did you mean waist_yaw"),
+        ({"waist_yaw": 0.6}, r"posture\.waist_yaw is 0\.6.*-0\.52.* to 0\.52"),
+        ({"waist_yaw": float("nan")}, r"posture\.waist_yaw is nan"),
+    ],
+)
+def test_bad_postures_are_refused_as_a_whole(scene, posture, told):
+    before = world.get_posture(scene.plant, scene.context)
+    with pytest.raises(InputError, match=told):
+        world.set_posture(
+            scene.plant, scene.context, {"neck_yaw": 0.5, **posture}
+        )
+    assert world.get_posture(scene.plant, scene.context) == before
+
+
+def test_inactive_joints_are_locked_and_stay(scene):
+    posture = {"neck_yaw": 0.4, "right_elbow_flexion": 1.5}
+    world.lock_inactive(scene.plant, scene.context, ACTIVE, posture)
+    for name in world.joint_names(scene.plant):
+        joint = world.get_joint(scene.plant, name)
+        assert joint.is_locked(scene.context) == (name not in ACTIVE)
+    found = world.get_posture(scene.plant, scene.context)
+    assert found["neck_yaw"] == 0.4
+    assert found["right_elbow_flexion"] == 1.5
+    world.lock_inactive(scene.plant, scene.context, ["neck_yaw"])
+    joint = world.get_joint(scene.plant, "neck_yaw")
+    assert not joint.is_locked(scene.context)
+    with pytest.raises(InputError, match="no joint 'elbow'"):
+        world.lock_inactive(scene.plant, scene.context, ["elbow"])
+
+
+def test_a_selection_picks_state_and_actuation_by_name(scene):
+    plant, context = scene.plant, scene.context
+    selection = world.select_joints(plant, ACTIVE)
+    robot = plant.GetModelInstanceByName("affetto")
+    rng = np.random.default_rng(0)
+    for name in world.joint_names(plant):
+        joint = world.get_joint(plant, name)
+        joint.set_angle(context, rng.uniform(-0.1, 0.1))
+        joint.set_angular_rate(context, rng.uniform(-1, 1))
+    state = plant.get_state_output_port(robot).Eval(context)
+    joints = [world.get_joint(plant, name) for name in ACTIVE]
+    expected = [j.get_angle(context) for j in joints] + [
+        j.get_angular_rate(context) for j in joints
+    ]
+    assert selection.state_matrix @ state == pytest.approx(expected)
+    n = len(ACTIVE)
+    assert state[selection.positions] == pytest.approx(expected[:n])
+    velocities = plant.GetVelocities(context, robot)
+    assert velocities[selection.velocities] == pytest.approx(expected[n:])
+    torque = np.arange(1.0, n + 1)
+    actuation = selection.actuation_matrix @ torque
+    assert actuation[selection.actuators] == pytest.approx(torque)
+    for i, name in enumerate(ACTIVE):
+        actuator = plant.GetJointActuatorByName(name, robot)
+        u = np.zeros(plant.num_actuated_dofs())
+        actuator.set_actuation_vector(np.array([torque[i]]), u)
+        assert actuation[u != 0] == pytest.approx([torque[i]])
+
+
+@pytest.mark.parametrize("names", [[], ["waist_yaw", "waist_yaw"]])
+def test_a_selection_is_not_empty_and_names_nothing_twice(scene, names):
+    with pytest.raises(InputError, match="none of them twice"):
+        world.select_joints(scene.plant, names)
+
+
+def test_limits_in_the_order_of_the_names(scene):
+    low, high = world.joint_limits(
+        scene.plant, ["right_elbow_flexion", "waist_yaw"]
+    )
+    assert np.degrees(low) == pytest.approx([0, -30], abs=1e-3)
+    assert np.degrees(high) == pytest.approx([130, 30], abs=1e-3)
+    effort = world.effort_limits(scene.plant, ["right_elbow_flexion"])
+    assert effort == pytest.approx([2.8])
+
+
+def test_a_default_posture_replaces_the_scene_s(scene):
+    plant = MultibodyPlant(0.001)
+    posture = {"neck_yaw": 0.72}
+    world.add_world(plant, world.WorldConfig(default_posture=posture))
+    plant.Finalize()
+    usual = world.get_posture(scene.plant, scene.context)
+    found = world.get_posture(plant, plant.CreateDefaultContext())
+    assert found == {**usual, **posture}
+    assert usual["neck_yaw"] != 0.72
+
+
+@pytest.mark.parametrize(
+    ("config", "told"),
+    [
+        ({"drum": "package://drake_affetto/sdf/tabla.sdf"}, "drum.*tabla.sdf"),
+        ({"directives": "nowhere.dmd.yaml"}, "directives.*nowhere.dmd.yaml"),
+        ({"drum_position": [0.2]}, r"drum_position is \[0\.2\]"),
+        ({"drum_position": [0.2, 99.0]}, r"drum_position\[1\] is 99"),
+        ({"default_posture": {"neck_yaw": 9.0}}, r"default_posture\.neck_yaw"),
+        ({"default_posture": {"neck": 0.1}}, "no joint 'neck'"),
+    ],
+)
+def test_a_world_that_does_not_fit_is_told_in_one_line(config, told):
+    plant = MultibodyPlant(0.001)
+    with pytest.raises(InputError, match=told) as error:
+        world.add_world(plant, world.WorldConfig(**config))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("field", "name", "text", "told"),
+    [
+        (
+            "drum",
+            "tabor.sdf",
+            "<sdf version='1.9'><model name='tabor'><link name='shell'/>"
+            "</model></sdf>",
+            "tabor.sdf has no frame head_center",
+        ),
+        (
+            "drum",
+            "broken.sdf",
+            "<sdf version='1.9'><model name='x'><link>",
+            "cannot read .*broken.sdf: .*XML",
+        ),
+        (
+            "directives",
+            "empty.dmd.yaml",
+            "directives: []",
+            "empty.dmd.yaml has no model affetto",
+        ),
+        (
+            "directives",
+            "lost.dmd.yaml",
+            "directives: [{add_model: {name: a, file: package://lost/a.sdf}}]",
+            "cannot read .*lost.dmd.yaml: .*lost",
+        ),
+        (
+            "directives",
+            "odd.dmd.yaml",
+            "directives: [{add_modell: {}}]",
+            "cannot read .*odd.dmd.yaml: .*add_modell",
+        ),
+    ],
+)
+def test_files_that_do_not_fit_are_told_in_one_line(
+    tmp_path, field, name, text, told
+):
+    path = tmp_path / name
+    path.write_text(text)
+    plant = MultibodyPlant(0.001)
+    with pytest.raises(InputError, match=told) as error:
+        world.add_world(plant, world.WorldConfig(**{field: str(path)}))
+    assert "\n" not in str(error.value)
