@@ -30,10 +30,12 @@ from pydrake.systems.sensors import CameraInfo
 from drake_affetto.control.pidf_controller import PidfController
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.motion.dmp_source import DmpSource
+from drake_affetto.perception.analytic_blob_sensor import AnalyticBlobSensor
 from drake_affetto.perception.blob_sensor import BlobSensor
 from drake_affetto.perception.gaze import GazeMode, GazeTask
 from drake_affetto.perception.gaze_servo import GazeServo, gaze_view
 from drake_affetto.perception.mirror_camera import MirrorCamera
+from drake_affetto.perception.plant_sight import marker_radius
 from drake_affetto.pneumatics.actuation import PneumaticActuation
 from drake_affetto.pneumatics.chamber import Row
 from drake_affetto.pneumatics.parameters import resting_pressure
@@ -380,11 +382,22 @@ class AffettoStation(Diagram):
             mirrors=self.scenario.mirrors,
             render_config=self.scenario.rendering,
         )
-        self.blob_sensor = BlobSensor.AddToBuilder(
-            builder=builder,
-            color_image=self.camera.get_color_image_output_port(),
-            config=self.scenario.blob,
-        )
+        self.blob_sensor: BlobSensor | AnalyticBlobSensor
+        if self.scenario.camera.renderer == "analytic":
+            self.blob_sensor = AnalyticBlobSensor.AddToBuilder(
+                builder=builder,
+                plant=self.plant,
+                query_object=seen.get_query_output_port(),
+                camera=self.camera,
+                config=self.scenario.blob,
+                radius=marker_radius(self.plant, seen.model_inspector()),
+            )
+        else:
+            self.blob_sensor = BlobSensor.AddToBuilder(
+                builder=builder,
+                color_image=self.camera.get_color_image_output_port(),
+                config=self.scenario.blob,
+            )
         for system, names in (
             (self.camera, ("color_image", "label_image")),
             (self.blob_sensor, ("blob", "blob_pixels")),

@@ -16,37 +16,25 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.sensors import ImageRgba8U
 
-from drake_affetto.perception.blob import BlobCalibration, BlobConfig, detect
+from drake_affetto.perception.blob import (
+    Blob,
+    BlobCalibration,
+    BlobConfig,
+    detect,
+)
 
 # What x_img and y_img are when there is no marker. `found` tells.
 LOST = 0.5
 
 
-class BlobSensor(LeafSystem):
-    """Finds the marker in an image.
+class BlobReporter(LeafSystem):
+    """What sensors of the marker have in common: ports and calibration.
 
-    .. pydrake_system::
-
-        name: BlobSensor
-        input_ports:
-        - color_image
-        output_ports:
-        - blob
-        - blob_pixels
-
-    - color_image: ImageRgba8U.
-    - blob (3): x_img, y_img, found. The first two run from 0 to 1 over the
-      calibrated box, y downwards, and beyond outside of it. found is 1, or 0
-      where no marker is seen; x_img and y_img are then 0.5 and mean nothing.
-    - blob_pixels (4): u, v [pixels], area [pixels²], confidence in [0, 1]; all
-      0 where no marker is seen.
-
-    Nothing is kept from one image to the next, and no image is asked for
-    (so that none is rendered) until an output is evaluated. The calibration
-    is a numeric parameter (`set_calibration`).
+    A subclass declares its input ports, then calls `_declare_outputs`, and
+    says in `_find` what it sees.
     """
 
-    def __init__(self, config: BlobConfig | None = None) -> None:
+    def __init__(self, config: BlobConfig | None) -> None:
         super().__init__()
         self._config = config or BlobConfig()
         self._config.check("blob")
@@ -54,41 +42,29 @@ class BlobSensor(LeafSystem):
             BasicVector(self._config.calibration.to_vector())
         )
         self._calibration_index = int(calibration)
-        self._image_port = self.DeclareAbstractInputPort(
-            "color_image", Value(ImageRgba8U())
-        )
-        image = self.input_port_ticket(self._image_port.get_index())
+
+    def _declare_outputs(self, prerequisites: set) -> None:
+        """Declares the outputs, which depend on `prerequisites`."""
         self._pixels_cache = self.DeclareCacheEntry(
             description="blob in pixels",
             value_producer=ValueProducer(
                 allocate=Value(np.zeros(4)).Clone, calc=self._calc_detection
             ),
-            prerequisites_of_calc={image},
+            prerequisites_of_calc=prerequisites,
         )
-        prerequisites = {image, self.all_parameters_ticket()}
         self._blob_port = self.DeclareVectorOutputPort(
-            "blob", 3, self._calc_blob, prerequisites
+            "blob",
+            3,
+            self._calc_blob,
+            prerequisites | {self.all_parameters_ticket()},
         )
         self._pixels_port = self.DeclareVectorOutputPort(
-            "blob_pixels", 4, self._calc_pixels, {image}
+            "blob_pixels", 4, self._calc_pixels, prerequisites
         )
 
-    @staticmethod
-    def AddToBuilder(
-        *,
-        builder: DiagramBuilder,
-        color_image: OutputPort,
-        config: BlobConfig | None = None,
-    ) -> "BlobSensor":
-        """Adds a sensor that looks at `color_image`."""
-        sensor = BlobSensor(config)
-        sensor.set_name("blob_sensor")
-        builder.AddSystem(sensor)
-        builder.Connect(color_image, sensor.get_color_image_input_port())
-        return sensor
-
-    def get_color_image_input_port(self) -> InputPort:
-        return self._image_port
+    def _find(self, context: Context) -> Blob | None:
+        """The marker, if it is seen."""
+        raise NotImplementedError
 
     def get_blob_output_port(self) -> OutputPort:
         return self._blob_port
@@ -116,8 +92,7 @@ class BlobSensor(LeafSystem):
         ).SetFromVector(calibration.to_vector())
 
     def _calc_detection(self, context: Any, cache: Any) -> None:
-        image: Any = self._image_port.Eval(context)
-        blob = detect(image.data, self._config)
+        blob = self._find(context)
         cache.set_value(
             np.zeros(4)
             if blob is None
@@ -135,3 +110,58 @@ class BlobSensor(LeafSystem):
     def _calc_pixels(self, context: Context, output: BasicVector) -> None:
         pixels: Any = self._pixels_cache.Eval(context)
         output.SetFromVector(pixels)
+
+
+class BlobSensor(BlobReporter):
+    """Finds the marker in an image.
+
+    .. pydrake_system::
+
+        name: BlobSensor
+        input_ports:
+        - color_image
+        output_ports:
+        - blob
+        - blob_pixels
+
+    - color_image: ImageRgba8U.
+    - blob (3): x_img, y_img, found. The first two run from 0 to 1 over the
+      calibrated box, y downwards, and beyond outside of it. found is 1, or 0
+      where no marker is seen; x_img and y_img are then 0.5 and mean nothing.
+    - blob_pixels (4): u, v [pixels], area [pixels²], confidence in [0, 1]; all
+      0 where no marker is seen.
+
+    Nothing is kept from one image to the next, and no image is asked for
+    (so that none is rendered) until an output is evaluated. The calibration
+    is a numeric parameter (`set_calibration`).
+    """
+
+    def __init__(self, config: BlobConfig | None = None) -> None:
+        super().__init__(config)
+        self._image_port = self.DeclareAbstractInputPort(
+            "color_image", Value(ImageRgba8U())
+        )
+        self._declare_outputs(
+            {self.input_port_ticket(self._image_port.get_index())}
+        )
+
+    @staticmethod
+    def AddToBuilder(
+        *,
+        builder: DiagramBuilder,
+        color_image: OutputPort,
+        config: BlobConfig | None = None,
+    ) -> "BlobSensor":
+        """Adds a sensor that looks at `color_image`."""
+        sensor = BlobSensor(config)
+        sensor.set_name("blob_sensor")
+        builder.AddSystem(sensor)
+        builder.Connect(color_image, sensor.get_color_image_input_port())
+        return sensor
+
+    def get_color_image_input_port(self) -> InputPort:
+        return self._image_port
+
+    def _find(self, context: Context) -> Blob | None:
+        image: Any = self._image_port.Eval(context)
+        return detect(image.data, self._config)

@@ -1,5 +1,6 @@
 """A camera that sees what is reflected in planar mirrors."""
 
+import dataclasses
 import math
 from typing import Any
 
@@ -53,6 +54,7 @@ from drake_affetto.perception.optics import (
     mirror_view,
     reflect_camera,
 )
+from drake_affetto.perception.sight_model import Mirror
 
 DIRECT = "direct"
 MIRROR = "mirror"
@@ -102,6 +104,25 @@ def find_frame(plant: MultibodyPlant, name: str) -> Frame:
         raise InputError(f"the scene has no frame {name!r}") from error
 
 
+@dataclasses.dataclass(frozen=True)
+class Sight:
+    """What an image depends on, beside the scene.
+
+    Attributes:
+        X_WC: pose (4, 4) of the camera.
+        camera_id: number of the geometry frame of the body that carries it.
+        mirrors: the mirrors, where they are.
+        effects: the sensor's disturbances.
+        seed: of the sensor's noise.
+    """
+
+    X_WC: np.ndarray
+    camera_id: int = -1
+    mirrors: tuple[Mirror, ...] = ()
+    effects: ImageEffects = dataclasses.field(default_factory=ImageEffects)
+    seed: int = 0
+
+
 class MirrorCamera(LeafSystem):
     """A colour and label camera that sees reflections in planar mirrors.
 
@@ -114,12 +135,15 @@ class MirrorCamera(LeafSystem):
         - color_image
         - label_image
         - body_pose_in_world
+        - sight
 
     - query_object: the SceneGraph's query port.
     - color_image: ImageRgba8U. Calculated from the context whenever it is
       evaluated, as RgbdSensor does; nothing is rendered before.
     - label_image: ImageLabel16I of the true view: a mirror is its panel.
     - body_pose_in_world: RigidTransform X_WC.
+    - sight: `Sight`, where camera and mirrors are and what disturbs the
+      image; for `AnalyticBlobSensor`. Evaluating it renders nothing.
 
     The engine has no reflections of the scene. A planar mirror is exact with
     a second, virtual camera: the true camera, reflected in the mirror's
@@ -223,6 +247,9 @@ class MirrorCamera(LeafSystem):
             self._calc_pose,
             scene,
         )
+        self._sight_port = self.DeclareAbstractOutputPort(
+            "sight", Value(Sight(np.eye(4))).Clone, self._calc_sight, scene
+        )
 
     @staticmethod
     def AddToBuilder(
@@ -258,6 +285,9 @@ class MirrorCamera(LeafSystem):
 
     def get_body_pose_in_world_output_port(self) -> OutputPort:
         return self._pose_port
+
+    def get_sight_output_port(self) -> OutputPort:
+        return self._sight_port
 
     # What a user may ask or set
 
@@ -304,6 +334,10 @@ class MirrorCamera(LeafSystem):
         return ImageEffects.from_vector(
             context.get_numeric_parameter(self._effects_index).CopyToVector()
         )
+
+    def seed(self, context: Context) -> int:
+        """The seed of the sensor noise in this context."""
+        return int(context.get_numeric_parameter(self._seed_index)[0])
 
     def set_seed(self, context: Context, seed: int) -> None:
         """Sets the seed of the sensor noise (an integer from 0 on)."""
@@ -450,10 +484,12 @@ class MirrorCamera(LeafSystem):
                 cv2.INTER_LINEAR,
                 borderMode=cv2.BORDER_REPLICATE,
             )
-        effects = self.effects(context)
-        seed = int(context.get_numeric_parameter(self._seed_index)[0])
         image = apply_effects(
-            image, effects, self._noise_bank, seed, context.get_time()
+            image,
+            self.effects(context),
+            self._noise_bank,
+            self.seed(context),
+            context.get_time(),
         )
         data = output.get_mutable_value().mutable_data
         data[:, :, :3] = image
@@ -474,6 +510,24 @@ class MirrorCamera(LeafSystem):
 
     def _calc_pose(self, context: Any, output: Any) -> None:
         output.set_value(self.camera_pose(context))
+
+    def _calc_sight(self, context: Any, output: Any) -> None:
+        query = self._query(context)
+        output.set_value(
+            Sight(
+                self._X_WC(context, query),
+                self._camera_id.get_value(),
+                tuple(
+                    Mirror(
+                        self._X_WM(context, query, index),
+                        *self._size(context, query, index),
+                    )
+                    for index in range(len(self._mirrors))
+                ),
+                self.effects(context),
+                self.seed(context),
+            )
+        )
 
 
 def _frame_id(plant: MultibodyPlant, frame: Frame) -> FrameId:

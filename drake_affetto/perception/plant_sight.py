@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from pydrake.geometry import Cylinder, Role
+from pydrake.geometry import Cylinder, Role, SceneGraphInspector
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
@@ -16,15 +16,15 @@ from drake_affetto.perception.sight_model import Mirror, SightModel
 from drake_affetto.scene import world
 
 
-def marker_radius(plant: MultibodyPlant, context: Context) -> float:
+def marker_radius(
+    plant: MultibodyPlant, inspector: SceneGraphInspector
+) -> float:
     """Radius [m] of the drum's marker, from its visual geometry.
 
     Raises:
         InputError: if the drum has no visual cylinder named `marker`.
     """
     body = find_frame(plant, "drum::marker").body()
-    query: Any = plant.get_geometry_query_input_port().Eval(context)
-    inspector = query.inspector()
     frame = plant.GetBodyFrameIdOrThrow(body.index())
     for geometry in inspector.GetGeometries(frame, Role.kPerception):
         shape = inspector.GetShape(geometry)
@@ -50,13 +50,14 @@ def make_sight_model(
         yaw_joint: the joint by which the camera turns.
     """
     frame = find_frame(plant, config.frame)
+    query: Any = plant.get_geometry_query_input_port().Eval(context)
     return SightModel.from_chain(
         config.model(),
         world.serial_chain(plant, frame.name()),
         yaw_joint,
         world.get_posture(plant, context),
         float(world.marker_position(plant, context)[2]),
-        marker_radius(plant, context),
+        marker_radius(plant, query.inspector()),
         config.X_FC(),
     )
 

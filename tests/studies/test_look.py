@@ -91,3 +91,30 @@ def test_a_video_shows_the_gaze_at_work(tmp_path):
     while video.read()[0]:
         frames += 1
     assert frames > 20
+
+
+@pytest.mark.parametrize("name", ["drumming", "mirror"])
+def test_the_renderer_free_twin_gives_the_same_task_parameters(name):
+    taus = {}
+    for renderer in ("vtk", "analytic"):
+        scenario = load_scenario(name)
+        scenario.camera.renderer = renderer
+        trial = LookTrial(scenario)
+        taus[renderer] = []
+        for fraction in (0.2, 0.8):
+            region = scenario.drum_region
+            xy = [
+                low + fraction * (high - low)
+                for low, high in (region.x, region.y)
+            ]
+            trial.begin(np.array(xy), seed=1)
+            settled, tau, _ = trial.finish()
+            assert settled
+            taus[renderer].append(tau)
+    box = scenario.blob.calibration
+    focal = scenario.camera.model().focal_x
+    unit = np.array([box.u_max - box.u_min, box.v_max - box.v_min])
+    if name == "drumming":
+        unit = np.array([unit[1], focal])
+    differences = np.subtract(taus["vtk"], taus["analytic"]) * unit
+    assert np.abs(differences).max() < 0.4
