@@ -22,6 +22,8 @@ from drake_affetto.errors import InputError
 
 # Name of a command → its module in drake_affetto, and what it does.
 COMMANDS: dict[str, tuple[str, str]] = {
+    "demo": ("studies.demo", "teach, drum, look through the mirror, transfer"),
+    "view": ("view", "show the robot in a browser, with sliders"),
     "diagram": ("diagram", "draw a station's systems and their connections"),
     "look": ("studies.look", "draw what the robot's camera sees"),
 }

@@ -1,0 +1,312 @@
+"""`affetto demo`: the paper's whole story once, at small scale.
+
+Teach by hand, learn the skill, drum at unseen positions; then look through
+the mirror and compare the paper's four schemes. Every trial is a full
+simulation, judged by its sound.
+"""
+
+import argparse
+from collections.abc import Sequence
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drake_affetto import __version__
+from drake_affetto.errors import require_range
+from drake_affetto.output import prepare_output, write_json
+
+# The paper's four, in its order, and what this library would do by default.
+SCHEMES = ("unchanged", "relearn", "continue", "transfer", "transfer_default")
+
+
+@dataclasses.dataclass
+class DemoSize:
+    """How much the demo does.
+
+    Attributes:
+        demonstrations: positions taught, drum seen directly.
+        evaluations: unseen positions drummed at, drum seen directly.
+        samples: positions taught in the mirror.
+        mirror_evaluations: unseen positions for each scheme in the mirror.
+    """
+
+    demonstrations: int = 12
+    evaluations: int = 8
+    samples: int = 5
+    mirror_evaluations: int = 5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares the command's options."""
+    parser.add_argument(
+        "--out", metavar="DIR", default="out/demo", help="where results go"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, help="of everything that is random"
+    )
+    parser.add_argument(
+        "--workers",
+        type=int,
+        default=2,
+        metavar="N",
+        help="worker processes; 0 runs all in this one",
+    )
+    parser.add_argument(
+        "--meshcat",
+        action="store_true",
+        help="watch the trials in a browser as they run (one process)",
+    )
+    parser.add_argument(
+        "--restart",
+        action="store_true",
+        help="run trials again that an earlier run into DIR has finished",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Runs the demo; returns the exit code."""
+    require_range("--seed", args.seed, 0, 2**31 - 1)
+    require_range("--workers", args.workers, 0, 256)
+    out = prepare_output(args.out)
+
+    from rich.console import Console
+
+    console = Console()
+    results = run_demo(
+        out,
+        seed=args.seed,
+        workers=args.workers,
+        watch=args.meshcat,
+        restart=args.restart,
+        console=console,
+    )
+    _print_tables(results, console)
+    console.print(f"Results, pictures, sounds and the replay are in {out}")
+    return 0
+
+
+def run_demo(
+    out: Path,
+    *,
+    seed: int = 0,
+    workers: int = 2,
+    watch: bool = False,
+    restart: bool = False,
+    size: DemoSize | None = None,
+    console: Any = None,
+    exhibits: bool = True,
+) -> dict[str, Any]:
+    """Runs the demo into the folder `out` and returns its results.
+
+    Args:
+        seed: of positions, teaching and noise.
+        workers: worker processes; 0 for this one.
+        watch: shows the trials in Meshcat, in this process.
+        restart: whether to run finished trials again.
+        size: how much to do.
+        console: a rich console for messages; None for silence.
+        exhibits: whether to write pictures, sounds and the replay too.
+    """
+    from drake_affetto.scenario import load_scenario
+    from drake_affetto.studies.pool import Crew
+    from drake_affetto.studies.store import TrialStore
+    from drake_affetto.studies.tasks import (
+        demonstration,
+        draw_positions,
+        drumming,
+        run_task,
+        set_runner,
+    )
+    from drake_affetto.studies.trials import TrialRunner
+
+    size = size or DemoSize()
+    direct, mirror = load_scenario("drumming"), load_scenario("mirror")
+    path = out / "trials.sqlite"
+    if restart:
+        for old in (path, *(Path(f"{path}{s}") for s in ("-wal", "-shm"))):
+            old.unlink(missing_ok=True)
+    if watch:
+        from pydrake.geometry import StartMeshcat
+
+        meshcat = StartMeshcat()
+        if console is not None:
+            console.print(f"Watch at {meshcat.web_url()}")
+        workers = 0
+        for name, scenario in (("drumming", direct), ("mirror", mirror)):
+            scenario.simulator_config.target_realtime_rate = 1.0
+            set_runner(name, TrialRunner(scenario, meshcat))
+
+    rng = np.random.default_rng([seed, 0xD2])
+    taught = draw_positions(direct, size.demonstrations, rng)
+    unseen = draw_positions(direct, size.evaluations, rng)
+    taught_mirror = draw_positions(mirror, size.samples, rng)
+    unseen_mirror = draw_positions(mirror, size.mirror_evaluations, rng)
+    seeds = iter(range(seed * 100_000, (seed + 1) * 100_000))
+
+    with (
+        TrialStore(path) as store,
+        Crew(run_task, store, workers=workers, quiet=console is None) as crew,
+    ):
+        lessons = crew.run(
+            "Teaching by hand",
+            [demonstration("drumming", xy, next(seeds)) for xy in taught],
+        )
+        good = [(r, a) for r, a in lessons if r["success"]]
+        prototypes = [a["prototype"] for _, a in good]
+        source = _fit_source(direct, good, seed)
+        trials = crew.run(
+            "Drumming at unseen positions",
+            [
+                drumming("drumming", xy, next(seeds), source, prototypes)
+                for xy in unseen
+            ],
+        )
+        mirror_lessons = crew.run(
+            "Teaching before the mirror",
+            [demonstration("mirror", xy, next(seeds)) for xy in taught_mirror],
+        )
+        samples = [(r, a) for r, a in mirror_lessons if r["success"]]
+        skills = _fit_schemes(mirror, source, samples)
+        # Every scheme meets the same positions and the same noise.
+        mirror_seeds = [next(seeds) for _ in unseen_mirror]
+        plan = [
+            drumming("mirror", xy, number, skill, prototypes)
+            for skill in skills.values()
+            for xy, number in zip(unseen_mirror, mirror_seeds, strict=True)
+        ]
+        outcomes = iter(crew.run("Drumming through the mirror", plan))
+        by_scheme = {
+            name: [next(outcomes)[0] for _ in unseen_mirror] for name in skills
+        }
+        if console is not None and crew.reused:
+            console.print(f"{crew.reused} trials were there already")
+
+    results = {
+        "version": __version__,
+        "seed": seed,
+        "drumming": {
+            "demonstrations": len(good),
+            "taught": _taught(taught, lessons),
+            "positions": [
+                {
+                    "xy": xy.tolist(),
+                    "tau": result["tau"],
+                    "reward": result["reward"],
+                    "success": result["success"],
+                }
+                for xy, (result, _) in zip(unseen, trials, strict=True)
+            ],
+            "success_rate": _rate([r for r, _ in trials]),
+        },
+        "mirror": {
+            "samples": len(samples),
+            "taught": _taught(taught_mirror, mirror_lessons),
+            "positions": [{"xy": xy.tolist()} for xy in unseen_mirror],
+            "schemes": {
+                name: {
+                    "success_rate": _rate(rows),
+                    "rewards": [row["reward"] for row in rows],
+                }
+                for name, rows in by_scheme.items()
+            },
+        },
+    }
+    if exhibits:
+        from drake_affetto.studies.exhibits import Exhibit, write_exhibits
+
+        if console is not None:
+            console.print("Recording a direct and a mirrored trial ...")
+        write_exhibits(
+            out,
+            Exhibit("direct", direct, source, unseen[0]),
+            Exhibit(
+                "mirror", mirror, skills["transfer_default"], unseen_mirror[0]
+            ),
+            prototypes,
+            seed,
+        )
+    # Last: where results.json is, all the rest is.
+    write_json(out / "results.json", results)
+    return results
+
+
+def _fit_source(scenario, lessons, seed: int):
+    """The parameterised skill from demonstrations one by one (Eqs. 3, 4)."""
+    from drake_affetto.errors import InputError
+    from drake_affetto.studies.skills import make_skill
+
+    if len(lessons) < 3:
+        raise InputError(
+            f"only {len(lessons)} demonstrations made a sound; a skill needs 3"
+        )
+    skill = make_skill(scenario.skill, seed)
+    for result, arrays in lessons:
+        skill.partial_fit([result["tau"]], [arrays["theta"]])
+    return skill
+
+
+def _fit_schemes(scenario, source, samples) -> dict[str, Any]:
+    from drake_affetto.studies.skills import fit_scheme
+
+    tau = np.array([result["tau"] for result, _ in samples])
+    theta = np.array([arrays["theta"] for _, arrays in samples])
+    return {
+        name: fit_scheme(name, source, tau, theta, scenario.skill)
+        for name in SCHEMES
+    }
+
+
+def _rate(rows: Sequence[dict[str, Any]]) -> float:
+    return float(np.mean([row["success"] for row in rows]))
+
+
+def _taught(positions: np.ndarray, lessons) -> list[dict[str, Any]]:
+    return [
+        {
+            "xy": xy.tolist(),
+            "tau": result["tau"],
+            "attempts": result["attempts"],
+            "reward": result["reward"],
+            "success": result["success"],
+        }
+        for xy, (result, _) in zip(positions, lessons, strict=True)
+    ]
+
+
+def _print_tables(results: dict[str, Any], console: Any) -> None:
+    from rich.table import Table
+
+    drum = results["drumming"]
+    table = Table(title="Drum seen directly: unseen positions")
+    for name in ("x [m]", "y [m]", "y_img", "q3* [°]", "reward", ""):
+        table.add_column(name, justify="right")
+    for row in drum["positions"]:
+        y_img, yaw = row["tau"]
+        table.add_row(
+            f"{row['xy'][0]:.3f}",
+            f"{row['xy'][1]:.3f}",
+            f"{y_img:.3f}",
+            f"{np.degrees(yaw):.1f}",
+            f"{row['reward']:.2f}",
+            "hit" if row["success"] else "miss",
+        )
+    console.print(table)
+    console.print(
+        f"After {drum['demonstrations']} demonstrations: "
+        f"{drum['success_rate']:.0%} of {len(drum['positions'])} positions"
+    )
+    mirror = results["mirror"]
+    table = Table(
+        title=f"Drum seen in the mirror, {mirror['samples']} demonstrations"
+    )
+    for name in ("scheme", "success", "rewards"):
+        table.add_column(name)
+    for name, row in mirror["schemes"].items():
+        table.add_row(
+            name,
+            f"{row['success_rate']:.0%}",
+            " ".join(f"{value:.2f}" for value in row["rewards"]),
+        )
+    console.print(table)
