@@ -22,6 +22,9 @@ FloatArray = NDArray[np.float64]
 # Gauss-Newton Hessian (S, P, P).
 Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 
+# Iterations that make the best minimum exact.
+_POLISH = 20
+
 
 @dataclasses.dataclass(frozen=True)
 class Prior:
@@ -177,30 +180,32 @@ class Objective:
         assert self._prior is not None
         assert isinstance(self._mapping, Affine)
         n_in = self._points.shape[1]
-        linear, _ = self._mapping.split(parameters, n_in)
-        linear = linear / self._prior.scale
+        scale = self._prior.scale
+        linear, _ = self._mapping.split(parameters / scale, n_in)
         n_starts, n_out, _ = linear.shape
-        residuals = []
-        changes = []
+        count = n_in * (n_in + 1) // 2 - 1
+        residual = np.empty((n_starts, count))
+        change = np.zeros((n_starts, count, parameters.shape[1]))
+        by_linear = change[..., : n_out * n_in]
+        by_linear = by_linear.reshape(n_starts, count, n_out, n_in)
+        row = 0
         for a in range(1, n_in):
-            # Each column as long as the one before it, and at right angles to
-            # all those.
+            own = linear[:, :, a]
+            # Each column is as long as the one before it, ...
+            before = linear[:, :, a - 1]
+            residual[:, row] = np.sum(before**2 - own**2, axis=1)
+            by_linear[:, row, :, a - 1] = 2.0 / scale * before
+            by_linear[:, row, :, a] = -2.0 / scale * own
+            row += 1
+            # ... and at right angles to all those.
             for b in range(a):
-                change = np.zeros_like(linear)
-                first, second = linear[:, :, b], linear[:, :, a]
-                change[:, :, b] = 2.0 * second
-                change[:, :, a] = 2.0 * first
-                residuals.append(2.0 * np.sum(first * second, axis=1))
-                changes.append(change)
-            change = np.zeros_like(linear)
-            before, own = linear[:, :, a - 1], linear[:, :, a]
-            change[:, :, a - 1] = 2.0 * before
-            change[:, :, a] = -2.0 * own
-            residuals.append(np.sum(before**2 - own**2, axis=1))
-            changes.append(change)
-        flat = np.stack(changes, axis=1).reshape(n_starts, len(changes), -1)
-        flat = np.pad(flat / self._prior.scale, ((0, 0), (0, 0), (0, n_out)))
-        return np.stack(residuals, axis=1), flat
+                other = linear[:, :, b]
+                residual[:, row] = 2.0 * np.sum(own * other, axis=1)
+                by_linear[:, row, :, b] = 2.0 / scale * own
+                by_linear[:, row, :, a] = 2.0 / scale * other
+                row += 1
+        change[..., : n_out * n_in] = by_linear.reshape(n_starts, count, -1)
+        return residual, change
 
 
 class Minima(NamedTuple):
@@ -222,13 +227,24 @@ def levenberg_marquardt(
     """Minimises from all starts (S, P) at once.
 
     Each start has its own damping, after Nielsen; those that have converged
-    rest. A start has converged once a step changes its cost by less than tol
-    times the cost.
+    rest. A start has converged once no step is expected to lower its cost by
+    more than tol times the cost. The best minimum is then made exact.
     """
+    minima = _descend(objective, starts, max_iter, tol)
+    best = int(np.argmin(minima.cost))
+    exact = _descend(objective, minima.parameters[best, None], _POLISH, 1e-14)
+    for all_values, value in zip(minima[:4], exact[:4], strict=True):
+        all_values[best] = value[0]
+    return minima
+
+
+def _descend(
+    objective: Evaluate, starts: FloatArray, max_iter: int, tol: float
+) -> Minima:
+    """`levenberg_marquardt` without the last step."""
     parameters = np.array(starts, dtype=float)
     cost, gradient, curvature = objective(parameters)
     n_starts, size = parameters.shape
-    diagonal = range(size)
     damping = np.full(n_starts, 1e-2)
     growth = np.full(n_starts, 2.0)
     converged = np.zeros(n_starts, dtype=bool)
@@ -239,11 +255,13 @@ def levenberg_marquardt(
         if index.size == 0 or iterations == max_iter:
             break
         here = curvature[index]
-        scale = here[:, diagonal, diagonal]
+        scale = here.reshape(-1, size * size)[:, :: size + 1]
         scale = np.maximum(scale, floor * scale.max(axis=1, keepdims=True))
         scale = np.maximum(scale, 1e-300)
         damped = here.copy()
-        damped[:, diagonal, diagonal] += damping[index, None] * scale
+        damped.reshape(-1, size * size)[:, :: size + 1] += (
+            damping[index, None] * scale
+        )
         step = -np.linalg.solve(damped, gradient[index][..., None])[..., 0]
         expected = np.sum(
             step * (damping[index, None] * scale * step - gradient[index]),

@@ -169,7 +169,7 @@ class TransferRegressor(
         solver: str = "lm",
         n_starts: int = 32,
         max_iter: int = 100,
-        tol: float = 1e-8,
+        tol: float = 1e-5,
         random_state: int | np.random.RandomState | None = 0,
     ) -> None:
         self.estimator = estimator
