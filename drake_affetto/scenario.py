@@ -3,6 +3,7 @@
 import dataclasses
 import difflib
 from pathlib import Path
+from typing import Any
 
 from pydrake.multibody.plant import MultibodyPlantConfig
 from pydrake.systems.analysis import SimulatorConfig
@@ -21,8 +22,7 @@ from drake_affetto.pneumatics.actuation import PneumaticActuationConfig
 from drake_affetto.resources import models_dir
 from drake_affetto.scene.world import WorldConfig
 from drake_affetto.skill.policy import SkillPolicyConfig
-from drake_affetto.sound.reward import RewardConfig
-from drake_affetto.sound.voice import VoiceConfig
+from drake_affetto.sound.config import load_sound_config
 from drake_affetto.teaching.stroke import TeacherConfig
 from drake_affetto.yaml_config import read_yaml, typed
 
@@ -135,7 +135,7 @@ class Scenario:
         dmp: see `motion`.
         control: see `control`.
         pneumatics: see `pneumatics`.
-        voice, reward: see `sound`.
+        sound: YAML file of the drum's voice and of the reward.
         teaching: see `teaching`.
         motion_source: "skill": the robot looks, and moves as its skill says.
             "external": `affetto.desired_state` is an input of the station.
@@ -189,8 +189,7 @@ class Scenario:
     pneumatics: PneumaticActuationConfig = dataclasses.field(
         default_factory=PneumaticActuationConfig
     )
-    voice: VoiceConfig = dataclasses.field(default_factory=VoiceConfig)
-    reward: RewardConfig = dataclasses.field(default_factory=RewardConfig)
+    sound: str = "package://drake_affetto/sound.yaml"
     teaching: TeacherConfig = dataclasses.field(default_factory=TeacherConfig)
     motion_source: str = "skill"
     valve_source: str = "pidf"
@@ -244,12 +243,13 @@ class Scenario:
             self.pneumatics.mode,
             "'flow' where the valves are controlled by PIDF (Eq. 7)",
         )
+        load_sound_config(self.sound)
         for i, mirror in enumerate(self.mirrors):
             mirror.check(f"{where}.mirrors[{i}]")
         for field in dataclasses.fields(self):
-            part = getattr(self, field.name)
-            if dataclasses.is_dataclass(part):
-                part.check(f"{where}.{field.name}")  # type: ignore[attr-defined]
+            part: Any = getattr(self, field.name)
+            if hasattr(part, "check"):
+                part.check(f"{where}.{field.name}")
 
 
 def scenario_names() -> list[str]:

@@ -267,7 +267,7 @@ class AffettoStation(Diagram):
         )
 
     def touching_position(self, context: Context) -> np.ndarray:
-        """Where the palm is as the hand just touches the head's middle, (3,)."""
+        """Where the palm is as the hand touches the head's middle, (3,) m."""
         radius = world.hand_radius(self.plant, self._sub(self.plant, context))
         return self.head_center_position(context) + [0.0, 0.0, radius]
 

@@ -96,3 +96,10 @@ def test_an_unknown_name_offers_the_known_ones():
         load_scenario("../scenarios/drumming")
     with pytest.raises(InputError, match="no such scenario file"):
         load_scenario("nothing.yaml")
+
+
+def test_a_missing_sound_file_is_named(tmp_path):
+    path = tmp_path / "s.yaml"
+    path.write_text("sound: nowhere.yaml")
+    with pytest.raises(InputError, match=r"nowhere\.yaml"):
+        load_scenario(path)

@@ -163,7 +163,7 @@ def test_the_mirror_scenario_sees_the_drum_only_in_the_mirror():
     blob = port(station, context, "camera.blob_pixels")
     assert blob[2] > 100.0
     label = port(station, context, "camera.label_image").data[:, :, 0]
-    u, v = int(round(blob[0])), int(round(blob[1]))
+    u, v = round(blob[0]), round(blob[1])
     panel = station.plant.GetBodyByName("panel").index()
     assert label[v, u] == int(panel)
 
@@ -234,6 +234,4 @@ def test_shut_valves_hold_the_air_by_the_polytropic_law():
     p1, V1, q1 = air()
     assert np.abs(q1 - q0).max() > 0.05
     exponent = 1.2
-    np.testing.assert_allclose(
-        p1 * V1**exponent, p0 * V0**exponent, rtol=1e-4
-    )
+    np.testing.assert_allclose(p1 * V1**exponent, p0 * V0**exponent, rtol=1e-4)

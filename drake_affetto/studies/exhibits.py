@@ -128,11 +128,11 @@ def draw_view(path: Path, trials: TrialRunner) -> None:
         image, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC
     )
     box = trials.scenario.blob.calibration
-    corners = [
-        tuple(round(scale * (value + 0.5)) for value in corner)
+    first, last = (
+        [round(scale * (value + 0.5)) for value in corner]
         for corner in ((box.u_min, box.v_min), (box.u_max, box.v_max))
-    ]
-    cv2.rectangle(image, *corners, (255, 255, 255), 1, cv2.LINE_AA)
+    )
+    cv2.rectangle(image, first, last, (255, 255, 255), 1, cv2.LINE_AA)
     text = "no marker"
     if found:
         center = (round(scale * (u + 0.5)), round(scale * (v + 0.5)))
@@ -202,7 +202,7 @@ def draw_trial(
     for axis in axes:
         axis.grid(alpha=0.3)
         axis.margins(x=0.01)
-    verdict = "hit" if reward > trials.scenario.reward.threshold else "miss"
+    verdict = "hit" if reward > trials.reward_config.threshold else "miss"
     tau = ", ".join(f"{value:.3f}" for value in look.task_parameter)
     figure.suptitle(
         f"One trial: task parameter [{tau}], reward {reward:.2f} ({verdict})"

@@ -53,7 +53,7 @@ def trial_key(spec: Mapping[str, Any]) -> str:
 def pack_arrays(arrays: Mapping[str, np.ndarray]) -> bytes:
     """Arrays as the bytes of an npz archive."""
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, **arrays)
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)  # type: ignore[arg-type]
     return buffer.getvalue()
 
 

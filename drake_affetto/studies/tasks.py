@@ -123,7 +123,7 @@ def run_task(spec: Mapping[str, Any]) -> tuple[dict, dict[str, np.ndarray]]:
 
 def _run_demonstration(spec: Mapping[str, Any]):
     trials = runner(spec["scenario"]["name"])
-    threshold = trials.scenario.reward.threshold
+    threshold = trials.reward_config.threshold
     xy, seed = np.array(spec["xy"]), spec["seed"]
     look = trials.look(xy, seed)
     result: dict[str, Any] = {
@@ -179,7 +179,7 @@ def _run_drumming(spec: Mapping[str, Any]):
     step = recording.t[1] - recording.t[0]
     result.update(
         reward=value,
-        success=bool(value > trials.scenario.reward.threshold),
+        success=bool(value > trials.reward_config.threshold),
         max_force=float(force.max()),
         impulse=float(force.sum() * step),
     )

@@ -20,6 +20,7 @@ from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.scenario import Scenario
 from drake_affetto.skill.policy import Regressor
+from drake_affetto.sound.config import load_sound_config
 from drake_affetto.sound.reward import (
     cut_prototype,
     reward,
@@ -141,18 +142,20 @@ class TrialRunner:
         ApplySimulatorConfig(scenario.simulator_config, self.simulator)
         self.context = self.simulator.get_mutable_context()
         self.dmp = Dmp(scenario.dmp)
-        self.voice = DrumVoice(scenario.voice)
+        sound = load_sound_config(scenario.sound)
+        self.voice = DrumVoice(sound.voice)
+        self.reward_config = sound.reward
         self.meshcat = meshcat
         self._settled: Context | None = None
 
     def taps(self) -> list[np.ndarray]:
         """Prototypes of what the drum sounds like when a person taps it."""
-        return tap_prototypes(self.voice, self.scenario.reward)
+        return tap_prototypes(self.voice, self.reward_config)
 
     def spectrogram(self, recording: Recording) -> np.ndarray:
         """(bands, frames) of a recording's sound."""
         return spectrogram(
-            recording.sound, recording.sound_rate, self.scenario.reward
+            recording.sound, recording.sound_rate, self.reward_config
         )
 
     def reward(
@@ -163,7 +166,7 @@ class TrialRunner:
 
     def prototype(self, recording: Recording) -> np.ndarray:
         """The recording's loudest moment, as a prototype for rewards."""
-        return cut_prototype(self.spectrogram(recording), self.scenario.reward)
+        return cut_prototype(self.spectrogram(recording), self.reward_config)
 
     def look(self, xy: np.ndarray, seed: int) -> Look:
         """Looks for the drum at xy (2,), m.

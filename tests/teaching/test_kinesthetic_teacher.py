@@ -105,7 +105,10 @@ def test_the_updates_are_those_of_the_mathematics(plant, teacher):
 
 def test_the_teacher_lets_go_at_the_end(plant, teacher):
     context, _, _ = run(
-        teacher, plant, np.array([0.0, 0.2, 1.6]), TeacherConfig().duration + 0.1
+        teacher,
+        plant,
+        np.array([0.0, 0.2, 1.6]),
+        TeacherConfig().duration + 0.1,
     )
     pulling = teacher.get_pulling_force_output_port().Eval(context)
     np.testing.assert_array_equal(pulling, np.zeros(3))
@@ -128,8 +131,6 @@ def test_a_new_stroke_begins_anew(plant, teacher):
 
 def test_a_stroke_without_a_time_is_refused(plant, teacher):
     context = teacher.CreateDefaultContext()
-    stroke = draw_stroke(
-        TeacherConfig(), np.zeros(3), np.random.default_rng(1)
-    )
+    stroke = draw_stroke(TeacherConfig(), np.zeros(3), np.random.default_rng(1))
     with pytest.raises(InputError, match="start_time"):
         teacher.set_stroke(context, stroke, np.inf)

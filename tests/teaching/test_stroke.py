@@ -26,9 +26,7 @@ TOUCHING = np.array([0.25, -0.05, 0.06])
 @settings(max_examples=50, deadline=None)
 def test_a_stroke_is_smooth_and_returns(seed, attempt):
     config = TeacherConfig()
-    stroke = draw_stroke(
-        config, TOUCHING, np.random.default_rng(seed), attempt
-    )
+    stroke = draw_stroke(config, TOUCHING, np.random.default_rng(seed), attempt)
     assert np.all(np.diff(stroke.times) > 0)
     t = np.linspace(0, config.duration, 3001)
     path = np.array([intended_position(stroke, GRASP, s) for s in t])
