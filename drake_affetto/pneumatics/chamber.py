@@ -231,7 +231,8 @@ def _implicit_pressure(
     low = min(p, p_far)
     high = max(p, p_far)
     x = 0.5 * (low + high)
-    for _ in range(60):
+    last = high - low
+    for _ in range(100):
         rate, slope = _pressure_rate(
             x, T, gain, supply, atmosphere, T_supply, c_fill, c_out, b
         )
@@ -241,11 +242,13 @@ def _implicit_pressure(
         else:
             low = x
         x_next = x - residual / (1.0 - h * slope)
-        if not low < x_next < high:
+        # Newton alone can go to and fro between the two sides of a kink.
+        if not low < x_next < high or abs(x_next - x) > 0.5 * last:
             x_next = 0.5 * (low + high)
-        if abs(x_next - x) < 1e-6:
-            return x_next
+        last = abs(x_next - x)
         x = x_next
+        if last < 1e-6:
+            break
     return x
 
 
@@ -341,9 +344,20 @@ def chamber_step(
             p, h, T, gain, supply, atmosphere, T_supply, c_fill, c_out, b
         )
     mdot = mdot_in - mdot_out
+    m_new = m + h * mdot
+    if h * (abs(mdot_in) + abs(mdot_out)) > 0.2 * m:
+        # So much air passes in one step that its balance, a difference of
+        # large numbers, says little. Temperature stays between what expansion
+        # of the old air and filling with the new one can make of it.
+        ratio = (p_new / p) ** ((n - 1.0) / n)
+        T_old = p * V / (m * GAS_CONSTANT)
+        T_low = min(T_old, T_supply) * min(ratio, 1.0)
+        T_high = max(T_old * max(ratio, 1.0), n * T_supply)
+        most = p_new * V / (T_low * GAS_CONSTANT)
+        least = p_new * V / (T_high * GAS_CONSTANT)
+        m_new = min(max(m_new, least), most)
+    m = m_new
     p = p_new * half
-    # A floor of the mass, for valves that could empty the chamber in a step.
-    m = max(m + h * mdot, 1e-3 * m)
     return p, m, mdot
 
 
