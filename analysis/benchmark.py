@@ -1,0 +1,41 @@
+"""Speed, as ratios of things measured in the same run.
+
+    python analysis/benchmark.py [--only NAME ...] [--list]
+
+Each benchmark is a function of a module beside this one that prints a few
+lines. Absolute times hold for this machine and this minute; the ratios say
+more. CPU time is what is measured, the least of several tries.
+"""
+
+import argparse
+import importlib
+
+# Name → the module beside this one and its function. A benchmark is imported
+# only when it runs: the learning core needs no Drake.
+BENCHMARKS = {
+    "dmp": ("bench_learning", "dmp"),
+    "elm": ("bench_learning", "elm"),
+    "transfer": ("bench_learning", "transfer"),
+    "station": ("bench_station", "run"),
+}
+
+
+def main() -> None:
+    """Runs the benchmarks that were asked for, in the order of the list."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "--only", nargs="+", choices=list(BENCHMARKS), metavar="NAME"
+    )
+    parser.add_argument("--list", action="store_true", help="names, and end")
+    args = parser.parse_args()
+    if args.list:
+        print("\n".join(BENCHMARKS))
+        return
+    for name in args.only or BENCHMARKS:
+        module, function = BENCHMARKS[name]
+        print(f"-- {name}", flush=True)
+        getattr(importlib.import_module(module), function)()
+
+
+if __name__ == "__main__":
+    main()
