@@ -183,7 +183,7 @@ class SightModel:
         best = np.full(np.shape(a), np.nan)
         for candidate in (base + spread, base - spread):
             yaw = np.mod(candidate + np.pi, 2 * np.pi) - np.pi
-            turned = _turn_points(self.axis, -yaw, p_A)
+            turned = turn_points(self.axis, -yaw, p_A)
             p_C = optics.transform_points(optics.invert_pose(self.X_AC), turned)
             good = (p_C[..., 2] > 0) & ~(np.abs(best) <= np.abs(yaw))
             best = np.where(good, yaw, best)
@@ -321,7 +321,7 @@ def _turn(axis: Array, angle: float) -> Array:
     return X
 
 
-def _turn_points(axis: Array, angle: Array, p: Array) -> Array:
+def turn_points(axis: Array, angle: Array, p: Array) -> Array:
     """Points (..., 3), each turned by its angle (...) about an axis (3,)."""
     c, s = np.cos(angle)[..., None], np.sin(angle)[..., None]
     along = (p @ axis)[..., None] * axis

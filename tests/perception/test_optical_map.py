@@ -1,0 +1,124 @@
+"""The map that knows optics, against the geometry of seeing."""
+
+import dataclasses
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from test_sight_model import FISHEYE, MIRROR, make
+
+from drake_affetto.perception.blob import BlobCalibration
+from drake_affetto.perception.optical_map import OpticalMap
+from drake_affetto.skill.mappings import Domain
+from drake_affetto.skill.optical import OpticalMapping
+
+YAW = 0.9
+DIRECT = BlobCalibration(-0.5, 319.5, 40.0, 180.0)
+MIRRORED = BlobCalibration(60.0, 200.0, 40.0, 120.0)
+WIDE = dataclasses.replace(MIRROR, width=9.0, height=9.0)
+
+
+def optical(target=None, **options):
+    source = make()
+    return OpticalMap(
+        target or source, MIRRORED, YAW, source, DIRECT, **options
+    )
+
+
+def samples(the_map, n, seed=0):
+    """(τ̂ (n, 2), τ (n, 2), xy (n, 2)) by the images of points."""
+    xy = np.random.default_rng(seed).uniform([0.2, -0.1], [0.34, 0.08], (n, 2))
+    uv = the_map.target.image_of(xy, YAW, WIDE)
+    p_W = the_map.source.marker(xy)
+    yaws = the_map.source.centring_yaw(p_W)
+    v = [
+        the_map.source.image_of(place[None], yaw)[0, 1]
+        for place, yaw in zip(xy, yaws, strict=True)
+    ]
+    y = (np.array(v) - DIRECT.v_min) / (DIRECT.v_max - DIRECT.v_min)
+    return MIRRORED.normalise(uv), np.stack([y, yaws], -1), xy
+
+
+@pytest.mark.parametrize("camera", [None, FISHEYE])
+def test_with_the_true_mirror_it_is_exact(camera):
+    the_map = optical(make(camera) if camera else None)
+    X, tau, xy = samples(the_map, 30)
+    parameters = the_map.parameters_of(MIRROR.X_WM)
+    np.testing.assert_allclose(the_map.apply(parameters, X), tau, atol=1e-9)
+    np.testing.assert_allclose(the_map.place(parameters, X), xy, atol=1e-9)
+
+
+def test_derivative_is_that_of_the_map():
+    the_map = optical(make(tilt=0.1))
+    X, _, _ = samples(the_map, 12)
+    base = the_map.parameters_of(MIRROR.X_WM)
+    for seed in range(4):
+        p = base + np.random.default_rng(seed).normal(size=3) * 0.1
+        derivative = the_map.derivative(p, X)
+        for k in range(3):
+            step = 1e-6 * np.eye(3)[k]
+            difference = (
+                the_map.apply(p + step, X) - the_map.apply(p - step, X)
+            ) / 2e-6
+            np.testing.assert_allclose(
+                derivative[:, :, k], difference, rtol=1e-4, atol=1e-6
+            )
+
+
+def test_it_stays_finite_wherever_a_search_strays():
+    the_map = optical()
+    X, _, _ = samples(the_map, 10)
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        p = rng.normal(size=3) * 2.0
+        assert np.all(np.isfinite(the_map.apply(p, X)))
+        assert np.all(np.isfinite(the_map.derivative(p, X)))
+
+
+def test_two_samples_tell_the_mirror():
+    """3 unknowns: two samples of two numbers each are enough."""
+    the_map = optical()
+    X, tau, _ = samples(the_map, 40)
+    domains = [SimpleNamespace(mean=v.mean(axis=0)) for v in (X, tau)]
+    starts = the_map.starts(*domains, 6, None)
+    assert len({name for name, _ in starts}) == 6
+    few = [0, 7]
+    fits = [
+        least_squares(
+            lambda p: (the_map.apply(p, X[few]) - tau[few]).ravel(),
+            start,
+            lambda p: the_map.derivative(p, X[few]).reshape(-1, 3),
+        )
+        for _, start in starts
+    ]
+    best = min(fits, key=lambda fit: fit.cost)
+    np.testing.assert_allclose(
+        best.x, the_map.parameters_of(MIRROR.X_WM), atol=1e-4
+    )
+    np.testing.assert_allclose(the_map.apply(best.x, X), tau, atol=1e-4)
+
+
+def test_starts_map_the_middle_to_the_middle():
+    the_map = optical()
+    X, tau, _ = samples(the_map, 40)
+    domains = Domain.of_samples(X), Domain.of_samples(tau)
+    for _, start in the_map.starts(*domains, 5, None):
+        np.testing.assert_allclose(
+            the_map.apply(start, domains[0].mean[None])[0],
+            domains[1].mean,
+            atol=1e-6,
+        )
+
+
+def test_it_is_a_map_for_transfer():
+    source = make()
+    mapping = OpticalMapping(source, MIRRORED, YAW, source, DIRECT)
+    assert mapping.count(2, 2) == 3
+    X, tau, _ = samples(mapping, 5)
+    p = mapping.parameters_of(MIRROR.X_WM)
+    np.testing.assert_allclose(
+        mapping.apply_many(np.array([p, p]), X), [tau, tau], atol=1e-9
+    )
+    with pytest.raises(ValueError, match="not 3 to 2"):
+        mapping.count(3, 2)
