@@ -67,7 +67,12 @@ class DmpConfig:
         ridge: weight of ‖θ‖² beside the mean squared error, the error being
             expressed as a forcing term.
         smoothing: s, time scale below which a demonstration is smoothed
-            before it is differentiated ("forcing" only).
+            before it is differentiated ("forcing" only). It also blurs a
+            movement that sets out abruptly; "trajectory" does not.
+
+    The defaults were chosen on 3 s windows of a real demonstration (30 Hz), by
+    the error on samples that were left out; within 25 to 400 1/s² of stiffness
+    and widths of 0.5 to 1 they hardly matter.
     """
 
     n_basis: int = 15
