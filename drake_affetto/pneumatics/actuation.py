@@ -315,7 +315,7 @@ class PneumaticActuation(LeafSystem):
     def pressures_for_torque(
         self, context: Context, torque: ArrayLike, mean: ArrayLike | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Chamber pressures that give `torque` at a mean pressure.
+        """Chamber pressures that give `torque` at about a mean pressure.
 
         Args:
             context: this system's context.
@@ -329,15 +329,16 @@ class PneumaticActuation(LeafSystem):
         array = self.get_parameters(context)
         if mean is None:
             mean = resting_pressure(array)
-        mean = np.asarray(mean, dtype=float)
-        gauge = mean - array[Row.ATMOSPHERE]
+        wanted = np.asarray(torque, dtype=float)
         K_a, K_b = array[Row.K_A], array[Row.K_B]
-        shift = (np.asarray(torque) - (K_a - K_b) * gauge) / (K_a + K_b)
         low, high = array[Row.ATMOSPHERE], array[Row.SUPPLY]
-        return (
-            np.clip(mean + shift, low, high),
-            np.clip(mean - shift, low, high),
-        )
+        gauge = np.asarray(mean, dtype=float) - low
+        shift = (wanted - (K_a - K_b) * gauge) / (K_a + K_b)
+        # Where one chamber meets a limit the other makes up for it.
+        p_a = np.clip(mean + shift, low, high)
+        p_b = np.clip(low + (K_a * (p_a - low) - wanted) / K_b, low, high)
+        p_a = np.clip(low + (K_b * (p_b - low) + wanted) / K_a, low, high)
+        return p_a, p_b
 
     def _update(
         self, context: Context, discrete_state: DiscreteValues

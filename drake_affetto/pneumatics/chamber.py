@@ -339,7 +339,10 @@ def chamber_step(
         if m_new <= 0.0:
             break
         T_end = p_new * V / (m_new * GAS_CONSTANT)
-        T = 0.5 * (T + min(max(T_end, 100.0), 1000.0))
+        T_end = min(max(T_end, 100.0), 1000.0)
+        if abs(T_end - T) < 1e-4 * T:
+            break
+        T = 0.5 * (T + T_end)
         p_new = _flow_pressure(
             p, h, T, gain, supply, atmosphere, T_supply, c_fill, c_out, b
         )
