@@ -9,9 +9,11 @@ All have the same interface, so that a study can run through them:
 from collections.abc import Callable
 import copy
 from typing import Any, Self
+import warnings
 
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin, clone
+from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import (
     RBF,
@@ -77,6 +79,18 @@ class Continued(RegressorMixin, BaseEstimator):
         return type(self)(self.estimator)
 
 
+class _GaussianProcess(GaussianProcessRegressor):
+    """scikit-learn's, which does not warn of length scales at their limits.
+
+    A handful of samples often tells no more than that.
+    """
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            return super().fit(X, y)
+
+
 def _relearn(source: Any, input_range: ArrayLike | None) -> Any:
     scratch = clone(source)
     if input_range is not None:
@@ -98,7 +112,7 @@ def _gaussian_process(source: Any) -> Any:
     ) + WhiteKernel(1e-2, (1e-5, 1e0))
     return make_pipeline(
         StandardScaler(),
-        GaussianProcessRegressor(kernel, normalize_y=True, random_state=0),
+        _GaussianProcess(kernel, normalize_y=True, random_state=0),
     )
 
 

@@ -219,8 +219,7 @@ def run_seed(
                 )
                 with warnings.catch_warnings():
                     # Five points do not determine six parameters: that is
-                    # the experiment. And with five points a Gaussian process
-                    # may find its length scale at the limit.
+                    # the experiment.
                     warnings.simplefilter("ignore", UserWarning)
                     estimator.fit(X, y, *further)
                 predicted = estimator.predict(problem.X_target)
