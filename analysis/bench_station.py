@@ -20,9 +20,7 @@ def _bare_plant(scenario) -> Simulator:
     plant.Finalize()
     diagram = builder.Build()
     simulator = Simulator(diagram)
-    context = plant.GetMyMutableContextFromRoot(
-        simulator.get_mutable_context()
-    )
+    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
     world.lock_inactive(plant, context, scenario.active_joints)
     plant.get_actuation_input_port().FixValue(
         context, np.zeros(plant.num_actuators())
