@@ -28,7 +28,6 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "identify": ("studies.identify", "fit the actuators to a robot's logs"),
     "view": ("view", "show the robot in a browser, with sliders"),
     "diagram": ("diagram", "draw a station's systems and their connections"),
-    "look": ("studies.look", "draw what the robot's camera sees"),
 }
 
 _PROGRAM = "affetto"

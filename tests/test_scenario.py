@@ -92,7 +92,7 @@ def test_what_does_not_fit_is_named_in_one_line(tmp_path, text, message):
 def test_an_unknown_name_offers_the_known_ones():
     with pytest.raises(InputError, match="did you mean 'mirror'"):
         load_scenario("miror")
-    with pytest.raises(InputError, match="known are .*drumming"):
+    with pytest.raises(InputError, match=r"known are .*drumming"):
         load_scenario("../scenarios/drumming")
     with pytest.raises(InputError, match="no such scenario file"):
         load_scenario("nothing.yaml")
