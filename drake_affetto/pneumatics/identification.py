@@ -679,6 +679,7 @@ def fit_logs(
     logs: Sequence[RobotLog],
     *,
     state: FitState | None = None,
+    stages: int | None = None,
     prior: float = 0.03,
     on_evaluation: Callable[[int, float], None] | None = None,
     on_stage: Callable[[FitState], None] | None = None,
@@ -689,6 +690,7 @@ def fit_logs(
         problem: the joint.
         logs: at least one log.
         state: where a former fit stopped; None: from the beginning.
+        stages: how many of `STAGES` to do in all; None: all of them.
         prior: weight of the distance to the starting values, which settles
             what the logs leave open.
         on_evaluation: called as (stage, cost) while the fit goes on.
@@ -705,7 +707,8 @@ def fit_logs(
     simulator = JointSimulator(problem)
     if state is None:
         state = FitState(values=problem.start())
-    for stage in range(state.stage, len(STAGES)):
+    end = len(STAGES) if stages is None else stages
+    for stage in range(state.stage, end):
         state = _fit_stage(simulator, logs, state, stage, prior, on_evaluation)
         if on_stage is not None:
             on_stage(state)

@@ -1,0 +1,315 @@
+"""The controller as a system, and the robot's body held by it."""
+
+import numpy as np
+from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import (
+    ConstantVectorSource,
+    MatrixGain,
+    VectorLogSink,
+)
+import pytest
+
+from drake_affetto.control.pidf import PidfGains, load_control, pidf_update
+from drake_affetto.control.pidf_controller import PidfConfig, PidfController
+from drake_affetto.errors import InputError
+from drake_affetto.pneumatics.actuation import (
+    PneumaticActuation,
+    PneumaticActuationConfig,
+)
+from drake_affetto.scene.world import (
+    WorldConfig,
+    add_world,
+    get_joint,
+    joint_limits,
+    lock_inactive,
+    select_joints,
+)
+
+N = 2
+GAINS = PidfGains(kP=[5e5, 6e5], kI=[3e5, 2e5], kD=[2e4, 3e4], kF=[5e-6, 4e-6])
+
+
+def fixed(*, offset=True, **options):
+    """A controller with its inputs fixed, and its context."""
+    dut = PidfController(GAINS, **options)
+    context = dut.CreateDefaultContext()
+    fix(dut, context, offset=np.zeros(N) if offset else None)
+    return dut, context
+
+
+def fix(dut, context, desired=0.0, state=0.0, pressure=4e5, offset=None):
+    for port, value in (
+        (dut.get_desired_state_input_port(), desired),
+        (dut.get_estimated_state_input_port(), state),
+        (dut.get_chamber_pressure_input_port(), pressure),
+    ):
+        port.FixValue(context, np.broadcast_to(value, 2 * N).astype(float))
+    if offset is not None:
+        dut.get_equilibrium_offset_input_port().FixValue(context, offset)
+
+
+def test_ports_are_those_of_the_design():
+    dut, _ = fixed()
+    assert {
+        dut.get_input_port(i).get_name(): dut.get_input_port(i).size()
+        for i in range(dut.num_input_ports())
+    } == {
+        "desired_state": 2 * N,
+        "estimated_state": 2 * N,
+        "chamber_pressure": 2 * N,
+        "equilibrium_offset": N,
+    }
+    assert dut.get_valve_opening_output_port().size() == N
+    assert dut.get_pid_output_output_port().get_name() == "pid_output"
+    assert not dut.HasAnyDirectFeedthrough()
+
+
+def test_updates_are_those_of_the_law_and_held_in_between():
+    dut, context = fixed(integral_deadband=0.002)
+    random = np.random.default_rng(0)
+    integral, demand, opening = np.zeros(N), np.zeros(N), np.zeros(N)
+    simulator = Simulator(dut, context)
+    for k in range(6):
+        desired = random.uniform(-0.3, 0.3, 2 * N)
+        state = random.uniform(-0.3, 0.3, 2 * N)
+        pressure = random.uniform(3e5, 5e5, 2 * N)
+        offset = random.uniform(-1e4, 1e4, N)
+        fix(dut, context, desired, state, pressure, offset)
+        simulator.AdvanceTo(0.005 * k + 0.001)
+        pidf_update(
+            0.005,
+            GAINS.to_array(),
+            300e3,
+            550e3,
+            0.002,
+            desired,
+            state,
+            pressure,
+            offset,
+            integral,
+            demand,
+            opening,
+        )
+        # Whatever comes in until the next update has no effect.
+        fix(dut, context, 1.0, -1.0, 1e5, 5e5 * np.ones(N))
+        simulator.AdvanceTo(0.005 * k + 0.004)
+        found = dut.get_valve_opening_output_port().Eval(context)
+        np.testing.assert_array_equal(found, opening)
+        found = dut.get_pid_output_output_port().Eval(context)
+        np.testing.assert_array_equal(found, demand)
+
+
+def test_offset_is_zero_where_it_is_not_connected():
+    values = []
+    for offset in (True, False):
+        dut, context = fixed(offset=offset)
+        fix(dut, context, desired=0.1)
+        Simulator(dut, context).AdvanceTo(0.02)
+        values.append(dut.get_pid_output_output_port().Eval(context))
+    np.testing.assert_array_equal(*values)
+
+
+def test_offset_takes_the_place_of_the_integral():
+    # What the controller asks for at rest, asked for without integral.
+    dut, context = fixed()
+    fix(dut, context, desired=np.array([0.05, -0.02, 0.0, 0.0]))
+    Simulator(dut, context).AdvanceTo(1.0)
+    equilibrium = dut.get_pid_output_output_port().Eval(context)
+    assert np.all(np.abs(equilibrium) > 1e3)
+    dut, context = fixed()
+    dut.set_gains(context, GAINS.scaled(0.2))
+    fix(dut, context, offset=equilibrium)
+    Simulator(dut, context).AdvanceTo(0.02)
+    np.testing.assert_allclose(
+        dut.get_pid_output_output_port().Eval(context), equilibrium
+    )
+
+
+def test_gains_belong_to_the_context():
+    dut, context = fixed()
+    soft = GAINS.scaled(0.2)
+    dut.set_gains(context, soft)
+    np.testing.assert_array_equal(dut.get_gains(context).kP, soft.kP)
+    fresh = dut.CreateDefaultContext()
+    np.testing.assert_array_equal(dut.get_gains(fresh).kP, GAINS.kP)
+    with pytest.raises(InputError, match="gains"):
+        dut.set_gains(context, PidfGains([1.0], [1.0], [1.0], [1.0]))
+
+
+def test_context_can_be_used_again_after_a_reset():
+    dut, context = fixed()
+
+    def trial():
+        dut.reset(context)
+        context.SetTime(0.0)
+        fix(dut, context, desired=0.1)
+        Simulator(dut, context).AdvanceTo(0.1)
+        return dut.get_pid_output_output_port().Eval(context)
+
+    first = trial()
+    np.testing.assert_array_equal(trial(), first)
+    dut.reset(context)
+    assert not np.any(dut.get_valve_opening_output_port().Eval(context))
+
+
+def test_integral_can_be_set_in_pressure():
+    dut, context = fixed()
+    dut.set_integral(context, [2e4, -1e4])
+    Simulator(dut, context).AdvanceTo(0.001)
+    np.testing.assert_allclose(
+        dut.get_pid_output_output_port().Eval(context), [2e4, -1e4]
+    )
+
+
+def test_arguments_that_do_not_fit_are_named():
+    with pytest.raises(InputError, match="period"):
+        PidfController(GAINS, period=0.0)
+    with pytest.raises(InputError, match="integral_limit"):
+        PidfController(GAINS, integral_limit=-1.0)
+    with pytest.raises(InputError, match=r"here\.period"):
+        PidfConfig(period=3.0).check("here")
+
+
+ACTIVE = [
+    "waist_roll",
+    "waist_pitch",
+    "waist_yaw",
+    "right_shoulder_elevation",
+    "right_shoulder_abduction",
+    "right_shoulder_flexion",
+    "right_elbow_rotation",
+    "right_elbow_flexion",
+]
+
+
+class Body:
+    """The robot's body, its actuators and controllers."""
+
+    def __init__(self):
+        builder = DiagramBuilder()
+        self.plant, _ = AddMultibodyPlant(
+            MultibodyPlantConfig(
+                time_step=0.001, discrete_contact_approximation="lagged"
+            ),
+            builder,
+        )
+        plant = self.plant
+        add_world(plant, WorldConfig())
+        plant.Finalize()
+        robot = plant.GetModelInstanceByName("affetto")
+        selection = select_joints(plant, ACTIVE)
+        self.lower, self.upper = joint_limits(plant, ACTIVE)
+        n = self.n = len(ACTIVE)
+        self.actuation = PneumaticActuation.AddToBuilder(
+            builder=builder,
+            config=PneumaticActuationConfig(),
+            joint_names=ACTIVE,
+            q_lower=self.lower,
+            q_upper=self.upper,
+        )
+        self.controller = PidfController.AddToBuilder(
+            builder=builder, config=PidfConfig(), joint_names=ACTIVE
+        )
+        self.reference = builder.AddSystem(
+            ConstantVectorSource(np.zeros(2 * n))
+        )
+        state = builder.AddSystem(MatrixGain(selection.state_matrix))
+        torque = builder.AddSystem(MatrixGain(selection.actuation_matrix))
+        self.log = builder.AddSystem(VectorLogSink(2 * n, 0.01))
+        self.pressure_log = builder.AddSystem(VectorLogSink(2 * n, 0.01))
+        pressure = self.actuation.get_chamber_pressure_output_port()
+        for source, target in (
+            (plant.get_state_output_port(robot), state.get_input_port()),
+            (
+                state.get_output_port(),
+                self.actuation.get_estimated_state_input_port(),
+            ),
+            (
+                state.get_output_port(),
+                self.controller.get_estimated_state_input_port(),
+            ),
+            (
+                self.reference.get_output_port(),
+                self.controller.get_desired_state_input_port(),
+            ),
+            (pressure, self.controller.get_chamber_pressure_input_port()),
+            (
+                self.controller.get_valve_opening_output_port(),
+                self.actuation.get_command_input_port(),
+            ),
+            (
+                self.actuation.get_actuation_output_port(),
+                torque.get_input_port(),
+            ),
+            (
+                torque.get_output_port(),
+                plant.get_actuation_input_port(robot),
+            ),
+            (state.get_output_port(), self.log.get_input_port()),
+            (pressure, self.pressure_log.get_input_port()),
+        ):
+            builder.Connect(source, target)
+        self.diagram = builder.Build()
+
+    def hold(self, start, desired, seconds):
+        """Angles (n, N) and pressures (2n, N) at 100 Hz."""
+        context = self.diagram.CreateDefaultContext()
+        plant_context = self.plant.GetMyMutableContextFromRoot(context)
+        lock_inactive(
+            self.plant,
+            plant_context,
+            ACTIVE,
+            dict(zip(ACTIVE, map(float, start), strict=True)),
+        )
+        gravity = -self.plant.CalcGravityGeneralizedForces(plant_context)
+        torque = [
+            gravity[get_joint(self.plant, j).velocity_start()] for j in ACTIVE
+        ]
+        self.reference.get_mutable_source_value(
+            self.reference.GetMyMutableContextFromRoot(context)
+        ).set_value(np.concatenate([desired, np.zeros(self.n)]))
+        actuation = self.actuation.GetMyMutableContextFromRoot(context)
+        p_a, p_b = self.actuation.pressures_for_torque(actuation, torque)
+        self.actuation.set_pressures(actuation, p_a, p_b)
+        self.controller.set_integral(
+            self.controller.GetMyMutableContextFromRoot(context), p_a - p_b
+        )
+        Simulator(self.diagram, context).AdvanceTo(seconds)
+        return (
+            self.log.FindLog(context).data()[: self.n],
+            self.pressure_log.FindLog(context).data(),
+        )
+
+
+@pytest.fixture(scope="module")
+def body():
+    return Body()
+
+
+@pytest.mark.parametrize("share", [0.35, 0.6])
+def test_arm_holds_against_gravity_without_a_limit_cycle(body, share):
+    posture = body.lower + share * (body.upper - body.lower)
+    angles, pressures = body.hold(posture, posture, 6.0)
+    error = np.degrees(np.abs(angles - posture[:, None]))
+    assert np.all(np.max(error, axis=1) < 1.0)
+    spread = np.std(angles[:, 300:], axis=1) / (body.upper - body.lower)
+    assert np.all(spread < 0.005)
+    # The mean pressures stay where the underlap pins them.
+    mean = 0.5 * (pressures[: body.n] + pressures[body.n :])
+    assert np.max(np.abs(mean[:, -1] - mean[:, 0])) < 30e3
+
+
+def test_arm_reaches_another_posture_and_rests_there(body):
+    span = body.upper - body.lower
+    start, goal = body.lower + 0.5 * span, body.lower + 0.6 * span
+    angles, _ = body.hold(start, goal, 8.0)
+    rest = angles[:, 600:]
+    error = np.degrees(np.abs(rest.mean(axis=1) - goal))
+    assert np.all(error < 2.5)
+    assert np.all(rest.std(axis=1) / span < 0.005)
+
+
+def test_default_gains_name_every_active_joint():
+    assert set(ACTIVE) <= set(load_control().gains)
