@@ -121,13 +121,18 @@ class CameraConfig:
         require_range(f"{where}.latency", self.latency, 0.0, 1.0)
         if self.lens is not None:
             self.lens.check(f"{where}.lens")
-            corner = self.model().direction(np.array([-0.5, -0.5]))
+            corner = np.array([-0.5, -0.5])
+            model = self.model()
+            ray = model.direction(corner)
+            seen = bool(ray[2] > math.cos(_MAX_ANGLE)) and bool(
+                np.all(np.abs(model.project(ray) - corner) < 0.01)
+            )
             require(
-                bool(corner[2] > math.cos(_MAX_ANGLE)),
+                seen,
                 f"{where}.fov_y",
                 self.fov_y,
-                f"less: the image's corners may be {_MAX_ANGLE:g} rad off the "
-                "axis, as the lens is made from a pinhole's image",
+                "less: the lens does not map the image's corners, or they "
+                f"are more than {_MAX_ANGLE:g} rad off the axis",
             )
         effects = f"{where}.effects"
         require_range(f"{effects}.exposure", self.effects.exposure, -6, 6)

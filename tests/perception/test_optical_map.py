@@ -10,8 +10,10 @@ from test_sight_model import FISHEYE, MIRROR, make
 
 from drake_affetto.perception.blob import BlobCalibration
 from drake_affetto.perception.optical_map import OpticalMap
+from drake_affetto.skill.elm import ElmRegressor
 from drake_affetto.skill.mappings import Domain
 from drake_affetto.skill.optical import OpticalMapping
+from drake_affetto.skill.transfer import TransferRegressor
 
 YAW = 0.9
 DIRECT = BlobCalibration(-0.5, 319.5, 40.0, 180.0)
@@ -122,3 +124,28 @@ def test_it_is_a_map_for_transfer():
     )
     with pytest.raises(ValueError, match="not 3 to 2"):
         mapping.count(3, 2)
+
+
+def test_transfer_learns_the_mirror_from_three_samples():
+    """Through a skill: only the policy parameters of the samples are known."""
+    mapping = OpticalMapping(
+        *[getattr(optical(), f.name) for f in dataclasses.fields(OpticalMap)]
+    )
+    X, tau, _ = samples(mapping, 60)
+
+    def skill(tau):
+        """Policy parameters that differ all over the workspace."""
+        y, yaw = tau.T
+        return np.stack([yaw, y, np.sin(2 * y + 3 * yaw), y * yaw], axis=-1)
+
+    elm = ElmRegressor(
+        n_hidden=50, alpha=1e-6, input_range=[[0.0, 2.0], [-1.0, 0.5]]
+    ).fit(tau, skill(tau))
+    transfer = TransferRegressor(
+        elm, mapping, domain=[[0.0, 2.0], [-1.0, 0.5]], n_starts=8
+    ).fit(X[:3], skill(tau[:3]))
+    error = transfer.predict(X) - skill(tau)
+    assert np.abs(error).max() < 0.02
+    np.testing.assert_allclose(
+        transfer.parameters_, mapping.parameters_of(MIRROR.X_WM), atol=0.02
+    )
