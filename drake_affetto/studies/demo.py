@@ -74,14 +74,21 @@ def run(args: argparse.Namespace) -> int:
     from rich.console import Console
 
     console = Console()
-    results = run_demo(
-        out,
-        seed=args.seed,
-        workers=args.workers,
-        watch=args.meshcat,
-        restart=args.restart,
-        console=console,
-    )
+    try:
+        results = run_demo(
+            out,
+            seed=args.seed,
+            workers=args.workers,
+            watch=args.meshcat,
+            restart=args.restart,
+            console=console,
+        )
+    except KeyboardInterrupt:
+        console.print(
+            f"Finished trials are kept in {out}; the same command goes on "
+            "from there."
+        )
+        raise
     _print_tables(results, console)
     console.print(f"Results, pictures, sounds and the replay are in {out}")
     return 0
