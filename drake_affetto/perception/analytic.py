@@ -34,6 +34,10 @@ _RASTER_STEP = 0.5
 # The rim's part in the area that is found: area · (1 + _RIM / √area).
 _RIM = 0.09
 
+# Error of a completed marker: standard deviation for all hidden at area 1.
+_COMPLETION = 30.0
+_LEAST_TO_COMPLETE = 60.0
+
 _SAMPLES = 60
 
 
@@ -221,6 +225,34 @@ def _hits(X_WE: Array, radii: Array, start: Array, end: Array) -> Array:
     s = np.clip(-np.einsum("ij,ij->i", a, d) / np.maximum(dd, 1e-12), 0, 1)
     nearest = a + s[:, None] * d
     return np.einsum("ij,ij->i", nearest, nearest) < 1.0
+
+
+def completed(
+    area: float,
+    centroid: Array,
+    whole_area: float,
+    whole_centroid: Array,
+    seed: int,
+) -> Array:
+    """The centroid (2,) that is found of a marker that is seen in part.
+
+    The blob detection completes the ellipse if at least half of it is seen,
+    and is off the more of it is hidden.
+
+    Args:
+        area: of what is seen [pixels²].
+        centroid: of what is seen (2,) [pixels].
+        whole_area: of the whole marker's image [pixels²].
+        whole_centroid: of the whole marker's image (2,) [pixels].
+        seed: of the error.
+    """
+    hidden = 1.0 - area / max(whole_area, 1e-9)
+    if hidden < 0.01 or area < _LEAST_TO_COMPLETE or hidden > 0.5:
+        return centroid
+    cell = np.floor(np.asarray(centroid) / _RASTER_STEP).astype(int)
+    rng = np.random.default_rng([*(cell + 2**20), seed, 1])
+    error = _COMPLETION * hidden / math.sqrt(area) * rng.standard_normal(2)
+    return np.asarray(whole_centroid) + error
 
 
 def measured_blob(

@@ -17,6 +17,7 @@ from pydrake.systems.framework import (
 from drake_affetto.errors import InputError, require
 from drake_affetto.perception.analytic import (
     Hiders,
+    completed,
     measured_blob,
     visible_marker,
 )
@@ -28,6 +29,7 @@ from drake_affetto.perception.mirror_camera import (
     Sight,
     find_frame,
 )
+from drake_affetto.perception.optics import project_disc
 
 
 class AnalyticBlobSensor(BlobReporter):
@@ -148,23 +150,33 @@ class AnalyticBlobSensor(BlobReporter):
             )
         X_WD = query.GetPoseInWorld(self._marker_id) @ self._X_BD
         hiders = self._hiders(query, sight.camera_id)
-        area, centroid = max(
-            (
-                visible_marker(
-                    self._model,
-                    sight.X_WC,
-                    X_WD.GetAsMatrix4(),
-                    self._radius,
-                    mirror,
-                    hiders,
-                    self._camera.near,
-                )
-                for mirror in (None, *sight.mirrors)
-            ),
-            key=lambda seen: seen[0],
-        )
+        X_WD = X_WD.GetAsMatrix4()
+        seen = [
+            visible_marker(
+                self._model,
+                sight.X_WC,
+                X_WD,
+                self._radius,
+                mirror,
+                hiders,
+                self._camera.near,
+            )
+            for mirror in (None, *sight.mirrors)
+        ]
+        index = max(range(len(seen)), key=lambda i: seen[i][0])
+        area, centroid = seen[index]
         if not area > 0.0 or not self._in_region(centroid):
             return None
+        if self._config.complete:
+            whole, whole_area, _ = project_disc(
+                self._model,
+                sight.X_WC,
+                X_WD[:3, 3],
+                X_WD[:3, 2],
+                self._radius,
+                None if index == 0 else sight.mirrors[index - 1].X_WM,
+            )
+            centroid = completed(area, centroid, whole_area, whole, sight.seed)
         image_area = self._model.width * self._model.height
         return measured_blob(
             area,

@@ -116,6 +116,8 @@ class BlobConfig:
         max_aspect: greatest ratio of that ellipse's axes.
         region: part of the image to look at: left, upper, right, lower edge
             as fractions of width and height.
+        complete: whether a marker that is hidden in part is completed to the
+            ellipse that its rim is part of.
         detector: "moments", or "simple" for OpenCV's SimpleBlobDetector.
         calibration: the pixels that are x_img, y_img = 0 and 1.
     """
@@ -132,6 +134,7 @@ class BlobConfig:
     region: list[float] = dataclasses.field(
         default_factory=lambda: [0.0, 0.0, 1.0, 1.0]
     )
+    complete: bool = True
     detector: str = "moments"
     calibration: BlobCalibration = dataclasses.field(
         default_factory=BlobCalibration
@@ -189,6 +192,14 @@ class Blob:
     v: float
     area: float
     confidence: float
+
+
+# Rims of fewer pixels do not tell an ellipse from another [pixels²].
+_LEAST_TO_COMPLETE = 60.0
+# How far a whole marker's rim is off its ellipse, at most of it [pixels].
+_ROUGH = 0.75
+# What lies this near to an ellipse is on it [pixels].
+_ON_RIM = 0.6
 
 
 def marker_lab(color: list[float]) -> tuple[float, float, float]:
@@ -385,9 +396,112 @@ def _moment_blobs(
         x, y, w, h = (int(value) for value in stats[i, :4])
         moments = _refine(lab, labels, int(i), (x, y, w, h))
         blob = _judge(moments, config)
-        if blob is not None:
-            blobs.append(blob)
+        if blob is None:
+            continue
+        if config.complete and blob.area >= _LEAST_TO_COMPLETE:
+            part = (labels[y : y + h, x : x + w] == i).astype(np.uint8)
+            blob = _complete(blob, moments, part, (x, y), config)
+        blobs.append(blob)
     return blobs
+
+
+def _complete(
+    blob: Blob,
+    moments: tuple[float, float, float, float, float, float],
+    part: Array,
+    corner: tuple[int, int],
+    config: BlobConfig,
+) -> Blob:
+    """The middle of the whole ellipse where a part of it is hidden.
+
+    An ellipse that fits most of the rim is looked for from arcs of it, as
+    what hides the marker cuts its rim on one side.
+    """
+    contours, _ = cv2.findContours(
+        np.pad(part, 1), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
+    )
+    rim = max(contours, key=len)[:, 0].astype(np.float64)
+    rim += np.array(corner) - 1.0
+    n = len(rim)
+    if n < 16:
+        return blob
+    area, u, v, xx, xy, yy = moments
+    covariance = np.array([[xx, xy], [xy, yy]])
+    # A filled ellipse's axes are twice its standard deviations; the rim's
+    # pixels lie, in the mean, half a pixel within.
+    inverse = np.linalg.inv(4.0 * covariance)
+    offset = rim - [u, v]
+    if _off_rim(offset, inverse) <= max(_ROUGH, 0.04 * math.sqrt(area)):
+        return blob
+    best: tuple[float, Array, Array] | None = None
+    for length in (0.45, 0.6, 0.75):
+        for start in range(0, n, max(1, n // 12)):
+            arc = np.take(
+                rim, np.arange(start, start + round(length * n)), 0, mode="wrap"
+            )
+            fit = _fit_ellipse(arc)
+            if fit is None:
+                continue
+            near = np.abs(_distance(rim - fit[0], fit[1])) < _ON_RIM
+            score = float(near.mean())
+            if best is None or score > best[0]:
+                best = score, rim[near], fit[0]
+    if best is None or best[0] < 0.5 or len(best[1]) < 8:
+        return blob
+    final = _fit_ellipse(best[1])
+    if final is None:
+        return blob
+    middle, shape = final
+    # The fit is to pixels half a pixel within the edge.
+    size = np.sqrt(1.0 / np.linalg.eigvalsh(shape)) + 0.5
+    whole = math.pi * float(size[0] * size[1])
+    aspect = float(max(size) / min(size))
+    seen = area / whole
+    if not 0.45 < seen < 1.1 or aspect > config.max_aspect:
+        return blob
+    shift = float(np.linalg.norm(middle - [u, v]))
+    if shift > max(size):
+        return blob
+    return Blob(
+        float(middle[0]),
+        float(middle[1]),
+        area,
+        blob.confidence * min(1.0, seen),
+    )
+
+
+def _distance(offset: Array, shape: Array) -> Array:
+    """Signed distance (n,) [pixels], about, of points (n, 2) off an ellipse.
+
+    The ellipse is xᵀ·shape·x = 1 about the origin.
+    """
+    r = np.sqrt(
+        np.maximum(np.einsum("ni,ij,nj->n", offset, shape, offset), 1e-12)
+    )
+    return np.linalg.norm(offset, axis=1) * (1.0 - 1.0 / r)
+
+
+def _off_rim(offset: Array, shape: Array) -> float:
+    """How far the rim is off the ellipse, at most of its pixels [pixels]."""
+    distance = _distance(offset, shape)
+    return float(np.quantile(np.abs(distance - np.median(distance)), 0.95))
+
+
+def _fit_ellipse(points: Array) -> tuple[Array, Array] | None:
+    """Centre (2,) and shape (2, 2) of the ellipse nearest to points (n, 2)."""
+    if len(points) < 6:
+        return None
+    origin = points.mean(axis=0)
+    found = cv2.fitEllipseDirect((points - origin).astype(np.float32))
+    (u, v), (width, height), angle = found
+    if not (math.isfinite(u) and min(width, height) > 2.0):
+        return None
+    if max(width, height) > 1e3:
+        return None
+    c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+    turn = np.array([[c, -s], [s, c]])
+    scale = np.diag([4.0 / width**2, 4.0 / height**2])
+    return origin + [u, v], turn @ scale @ turn.T
 
 
 def _judge(

@@ -186,3 +186,45 @@ def test_bad_settings_are_named():
     ):
         with pytest.raises(InputError, match=f"blob.*{field}"):
             config.check("blob")
+
+
+@pytest.mark.parametrize("hidden", [0.15, 0.3])
+@pytest.mark.parametrize("radius", [9.0, 20.0])
+def test_a_marker_hidden_in_part_is_completed(hidden, radius):
+    """A round thing before it; the middle found is that of the whole."""
+    rng = np.random.default_rng(2)
+    errors, cut = [], []
+    for _ in range(8):
+        u, v = rng.uniform([100, 80], [220, 160])
+        image = draw_disc(u, v, radius, squeeze=0.8)
+        angle = rng.uniform(0, 2 * np.pi)
+        way = np.array([np.cos(angle), np.sin(angle)])
+        # The cover's edge is so far from the middle that it hides that part.
+        reach = radius * (1.0 - 2.0 * hidden) * (1.0 - 0.2 * way[1] ** 2)
+        cover = np.array([u, v]) + way * (reach + 2.5 * radius)
+        image = draw_disc(
+            *cover, 2.5 * radius, image=image, color=(212, 164, 137)
+        )
+        whole = detect(image, BlobConfig())
+        part = detect(image, BlobConfig(complete=False))
+        assert whole is not None
+        assert part is not None
+        errors.append(np.hypot(whole.u - u, whole.v - v))
+        cut.append(np.hypot(part.u - u, part.v - v))
+        assert whole.confidence < 0.95
+    assert np.median(errors) < 0.35 * np.median(cut)
+    assert np.median(errors) < 0.08 * radius
+
+
+def test_a_whole_marker_is_left_as_it_is():
+    rng = np.random.default_rng(4)
+    for noise in (0.0, 6.0):
+        for _ in range(5):
+            u, v = rng.uniform([60, 60], [260, 180])
+            image = apply_effects(
+                draw_disc(u, v, rng.uniform(5, 25), squeeze=0.6),
+                ImageEffects(noise=noise),
+            )
+            assert detect(image, BlobConfig()) == detect(
+                image, BlobConfig(complete=False)
+            )
