@@ -137,7 +137,10 @@ def run_demo(
     if watch:
         from pydrake.geometry import StartMeshcat
 
+        from drake_affetto.scene.view import stand_before
+
         meshcat = StartMeshcat()
+        stand_before(meshcat)
         if console is not None:
             console.print(f"Watch at {meshcat.web_url()}")
         workers = 0

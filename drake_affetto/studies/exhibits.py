@@ -15,6 +15,7 @@ from pydrake.geometry import Meshcat, MeshcatParams, MeshcatVisualizerParams
 
 from drake_affetto.output import atomic_path, write_bytes_atomic
 from drake_affetto.scenario import Scenario
+from drake_affetto.scene.view import stand_before
 from drake_affetto.skill.policy import Regressor
 from drake_affetto.sound.voice import write_wav
 from drake_affetto.studies.trials import Look, Recording, TrialRunner
@@ -60,6 +61,7 @@ def write_exhibits(
         seed: of the noise.
     """
     meshcat = Meshcat(MeshcatParams(host="localhost"))
+    stand_before(meshcat)
     meshcat.StartRecording(
         frames_per_second=_FRAMES_PER_SECOND,
         set_visualizations_while_recording=False,
