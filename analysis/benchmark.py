@@ -16,6 +16,7 @@ BENCHMARKS = {
     "dmp": ("bench_learning", "dmp"),
     "elm": ("bench_learning", "elm"),
     "transfer": ("bench_learning", "transfer"),
+    "pneumatics": ("bench_pneumatics", "run"),
     "station": ("bench_station", "run"),
 }
 

@@ -11,7 +11,6 @@ from pydrake.systems.framework import (
     Context,
     DiagramBuilder,
     DiscreteValues,
-    EventStatus,
     InputPort,
     LeafSystem,
     OutputPort,
@@ -340,9 +339,7 @@ class PneumaticActuation(LeafSystem):
         p_a = np.clip(low + (K_b * (p_b - low) + wanted) / K_a, low, high)
         return p_a, p_b
 
-    def _update(
-        self, context: Context, discrete_state: DiscreteValues
-    ) -> EventStatus:
+    def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
         step_joints(
             self._time_step,
             self._mode,
@@ -357,7 +354,6 @@ class PneumaticActuation(LeafSystem):
             discrete_state.get_mutable_value(self._flow_index),
             discrete_state.get_mutable_value(self._memory_index),
         )
-        return EventStatus.Succeeded()
 
 
 def _chamber_torque(
