@@ -152,7 +152,7 @@ def transfer() -> None:
     X_new = (tasks - 0.3) @ turn.T
     y_new = skill.predict(tasks)
     y_new += 0.1 * random.normal(size=y_new.shape)
-    ours = TransferRegressor(skill, prior=None, average=False, n_starts=32)
+    ours = TransferRegressor(skill, prior=None, metric=None, average=False)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         ours.fit(X_new, y_new)

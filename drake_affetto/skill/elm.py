@@ -9,7 +9,8 @@ with x̄ the input scaled to its range. The read-out W minimises the squared
 error plus α ‖W‖² (Eq. 4). It is found recursively: what has been learned is
 kept as a square root of the information matrix, which a new sample updates by
 an orthogonal transformation. So the order of the samples does not matter, and
-rounding does not add up, however many there are.
+rounding does not add up, however many there are. What that transformation
+leaves of a sample's outputs tells, beside, how well they could be predicted.
 """
 
 from typing import Any, Self
@@ -17,6 +18,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import solve_triangular
+from scipy.linalg.blas import dsyrk
 from scipy.linalg.lapack import dtpmqrt, dtpqrt, dtrtrs
 from scipy.special import expit
 from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
@@ -29,6 +31,8 @@ FloatArray = NDArray[np.float64]
 _CHUNK = 1024
 # Columns that LAPACK transforms together; the fastest for 50 units.
 _BLOCK = 16
+# With more outputs their covariance would not be worth its memory.
+_MOST_OUTPUTS = 2000
 
 
 class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
@@ -54,6 +58,8 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         biases_: (H,), b.
         coef_: (H, F), or (H,) if y was one-dimensional: W.
         input_center_, input_gain_: (d,), x̄ = (x - center) * gain.
+        error_covariance_: (F, F), of the noise of the outputs, as far as the
+            samples tell; F at most 2000.
         n_samples_seen_: how many samples have been learned.
         input_mean_, input_covariance_: (d,), (d, d), of their inputs.
         input_low_, input_high_: (d,), least and greatest of their inputs.
@@ -158,13 +164,37 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         """
         check_is_fitted(self)
         X, y = self._validate(X, y, reset=False)
-        phi = self._activate(X)
-        half = solve_triangular(self._root, phi.T, trans="T")
-        free = 1.0 - np.einsum("hn,hn->n", half, half)
-        residuals = y - phi @ self.coef_
+        free = 1.0 - self.leverage(X)
+        residuals = y - self._activate(X) @ self.coef_
         # 1 where a sample alone determines its own prediction.
         free = np.maximum(free, 1e-12)
         return residuals / (free if y.ndim == 1 else free[:, None])
+
+    def leverage(self, X: ArrayLike) -> FloatArray:
+        """φᵀ (ΦᵀΦ + α I)⁻¹ φ (N,) at X (N, d).
+
+        A prediction there has an error of covariance
+        (leverage + noise) · error_covariance_, with noise = 1 for a further
+        sample and 0 for the function itself.
+        """
+        half = solve_triangular(self._root, self.hidden(X).T, trans="T")
+        return np.einsum("hn,hn->n", half, half)
+
+    @property
+    def error_covariance_(self) -> FloatArray:
+        """(F, F); see the class.
+
+        The read-out's prior being that of the ridge, this is the covariance
+        under which the outputs learned so far are likeliest.
+        """
+        check_is_fitted(self)
+        if self._left is None:
+            raise AttributeError(
+                f"with more than {_MOST_OUTPUTS} outputs there is no "
+                "error_covariance_"
+            )
+        upper = np.triu(self._left)
+        return (upper + np.triu(upper, 1).T) / self._weight_seen
 
     @property
     def coef_(self) -> FloatArray:
@@ -205,6 +235,13 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
             np.sqrt(self.alpha) * np.eye(self.n_hidden)
         )
         self._moment = np.zeros((self.n_hidden, n_outputs), order="F")
+        # YᵀY - zᵀz, its upper triangle; and the weight of all samples.
+        self._left = (
+            np.zeros((n_outputs, n_outputs), order="F")
+            if n_outputs <= _MOST_OUTPUTS
+            else None
+        )
+        self._weight_seen = 0.0
         self.n_samples_seen_ = 0
         self.input_mean_ = np.zeros(n_features)
         self.input_covariance_ = np.zeros((n_features, n_features))
@@ -260,11 +297,11 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
 
     def _absorb(self, phi: FloatArray, y: FloatArray) -> None:
         """Updates R and z by the rows phi (N, H) and y (N, F)."""
+        n = len(phi)
+        kept = self.forgetting**n
         if self.forgetting < 1.0:
-            n = len(phi)
             age = np.arange(n - 1, -1, -1)[:, None]
             weight = np.sqrt(self.forgetting**age)
-            kept = self.forgetting**n
             self._root *= np.sqrt(kept)
             self._moment *= np.sqrt(kept)
             # What the ridge has lost by forgetting comes back as rows.
@@ -277,7 +314,7 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         self._root, reflectors, factors, _ = dtpqrt(
             0, block, self._root, np.asfortranarray(phi), overwrite_a=True
         )
-        moment, _, _ = dtpmqrt(
+        moment, left, _ = dtpmqrt(
             0,
             reflectors,
             factors,
@@ -285,6 +322,15 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
             np.asfortranarray(y),
             trans="T",
             overwrite_a=True,
+        )
+        if self._left is not None:
+            self._left = dsyrk(
+                1.0, left, beta=kept, c=self._left, trans=1, overwrite_c=True
+            )
+        self._weight_seen = kept * self._weight_seen + (
+            n
+            if self.forgetting == 1.0
+            else (1.0 - kept) / (1.0 - self.forgetting)
         )
         # LAPACK gives a single column strides that a copy would not have.
         if moment.shape[1] == 1:

@@ -101,7 +101,12 @@ def _relearn(source: Any, input_range: ArrayLike | None) -> Any:
 
 def _paper(source: Any) -> TransferRegressor:
     return TransferRegressor(
-        source, prior=None, average=False, solver="bfgs", n_starts=1
+        source,
+        prior=None,
+        metric=None,
+        average=False,
+        solver="bfgs",
+        n_starts=1,
     )
 
 

@@ -44,6 +44,7 @@ from drake_affetto.skill.adapters import (
     SourceModel,
     source_domain,
     source_model,
+    unfrozen,
 )
 from drake_affetto.skill.elm import ElmRegressor
 from drake_affetto.skill.mappings import (
@@ -72,6 +73,12 @@ _MANY_INSIDE = 0.3
 _MANY_MOMENTS = 0.3
 # λ of the bare Eq. 5, chosen there too.
 _PLAIN_ALPHA = 0.03
+
+# How far the covariance of an ELM's errors is shrunk to its diagonal, and the
+# least deviation of an error relative to that of its output. Chosen on draws
+# of the tutorial's strokes that it does not show.
+_SHRINKAGE = 0.5
+_LEAST_ERROR = 0.01
 
 _PRIORS = ("auto", "domain", "similar", "moments")
 
@@ -104,8 +111,8 @@ class TransferRegressor(
     predict(X) = estimator.predict(h(X)), with h from `fit`. Bare Eq. 5, solved
     as the paper does, is
 
-        TransferRegressor(estimator, prior=None, average=False, solver="bfgs",
-                          n_starts=1)
+        TransferRegressor(estimator, prior=None, metric=None, average=False,
+                          solver="bfgs", n_starts=1)
 
     Args:
         estimator: a fitted regressor. It is used as it is, never fitted anew,
@@ -122,9 +129,11 @@ class TransferRegressor(
             it is not known where the skill was learned.
         noise: the error to be expected of the skill itself, relative to the
             standard deviation of its outputs. It scales prior and average.
-        metric: None; or covariance (F, F) or variances (F,) of the errors to
-            be expected, as from `loo_covariance`, by which residuals are
-            whitened. `noise` has no effect then.
+        metric: how residuals of several outputs are weighed. None: all alike.
+            Covariance (F, F) or variances (F,) of the errors to be expected,
+            as from `loo_covariance`: whitened by them. "auto": an ELM of
+            several outputs is asked for that covariance. With a covariance
+            `noise` has no effect.
         average: whether predictions are the average over all minima found,
             weighted by exp(-cost / 2σ²), or those of the best alone.
         domain: where the skill was learned: (d, 2), lowest and highest value
@@ -162,7 +171,7 @@ class TransferRegressor(
         alpha: float | None = None,
         prior: str | None = "auto",
         noise: float = 0.05,
-        metric: ArrayLike | None = None,
+        metric: ArrayLike | str | None = "auto",
         average: bool = True,
         domain: ArrayLike | Domain | None = None,
         residual: Any = None,
@@ -384,8 +393,15 @@ class TransferRegressor(
             The source with outputs (R), the y (N, R), the cost that no map can
             reduce, and the squared error to be expected of one output.
         """
-        if self.metric is not None:
-            matrix = _whitening(self.metric, source.n_out)
+        metric = self.metric
+        if isinstance(metric, str):
+            if metric != "auto":
+                raise ValueError(
+                    f"metric is {metric!r}, expected None, 'auto' or an array"
+                )
+            metric = _expected_errors(self.estimator, source, domain)
+        if metric is not None:
+            matrix = _whitening(metric, source.n_out)
             source, y = source.project(matrix), y @ matrix
             noise = 1.0
         else:
@@ -545,12 +561,43 @@ def loo_covariance(
         )
     residuals = estimator.loo_residuals(X, y)
     residuals = residuals.reshape(len(residuals), -1)
-    covariance = residuals.T @ residuals / len(residuals)
+    return _shrunk(residuals.T @ residuals / len(residuals), shrinkage)
+
+
+def _shrunk(
+    covariance: FloatArray, shrinkage: float, floor: float | FloatArray = 0.0
+) -> FloatArray:
+    """On the way to its diagonal, with a floor (F,) of the variances."""
     variances = np.diag(covariance)
     # No output is known better than a thousandth of the worst.
-    floor = max(1e-6 * float(variances.max()), 1e-300)
-    result = (1.0 - shrinkage) * covariance
-    return result + np.diag(shrinkage * variances + floor)
+    least = max(1e-6 * float(variances.max()), 1e-300)
+    return (1.0 - shrinkage) * covariance + np.diag(
+        shrinkage * variances + floor + least
+    )
+
+
+def _expected_errors(
+    estimator: Any, source: SourceModel, domain: Domain | None
+) -> FloatArray | None:
+    """Covariance (F, F) of the errors of an ELM's predictions; else None.
+
+    That of a new sample, averaged over the tasks of the domain: the noise of
+    the outputs, and what the samples have left open of the function.
+    """
+    elm = unfrozen(estimator)
+    if not isinstance(elm, ElmRegressor) or source.n_out == 1:
+        return None
+    try:
+        covariance = elm.error_covariance_
+    except AttributeError:
+        return None
+    assert domain is not None
+    tasks = domain.low + _even_tasks(source.n_in) * (domain.high - domain.low)
+    predicted, _ = source.evaluate(tasks)
+    covariance = covariance * (1.0 + np.mean(elm.leverage(tasks)))
+    # A skill that fits its samples exactly is still not exact elsewhere.
+    floor = _LEAST_ERROR**2 * np.var(predicted, axis=0)
+    return _shrunk(covariance, _SHRINKAGE, floor)
 
 
 def _make_prior(

@@ -167,8 +167,8 @@ def make_transfer(name: str, source: Any) -> Any:
     if name == "paper_single_start":
         return make_scheme("transfer", source)
     options: dict[str, dict[str, Any]] = {
-        "several_starts": {"prior": None, "average": False},
-        "averaged_starts": {"prior": None},
+        "several_starts": {"prior": None, "metric": None, "average": False},
+        "averaged_starts": {"prior": None, "metric": None},
         "default": {},
         "unlabelled": {},
         "similarity": {"mapping": "similarity"},

@@ -159,6 +159,54 @@ def test_leave_one_out_by_leaving_out(flat):
         assert_allclose(residuals[i], missed, rtol=1e-6)
 
 
+@pytest.mark.parametrize("forgetting", [1.0, 0.9])
+def test_error_covariance_is_the_likeliest(forgetting):
+    """Yᵀ K⁻¹ Y / N, with K the covariance of samples under the prior."""
+    X, y = samples(30)
+    elm = ElmRegressor(9, 1e-2, forgetting=forgetting, random_state=0)
+    for part in np.array_split(np.arange(30), [1, 4, 20]):
+        elm.partial_fit(X[part], y[part])
+    weights = forgetting ** np.arange(29, -1, -1)
+    phi, y = (np.sqrt(weights)[:, None] * a for a in (elm.hidden(X), y))
+    kernel = np.eye(30) + phi @ phi.T / 1e-2
+    known = y.T @ np.linalg.solve(kernel, y) / weights.sum()
+    assert_allclose(elm.error_covariance_, known, rtol=1e-9, atol=1e-12)
+    gram = phi.T @ phi + 1e-2 * np.eye(9)
+    at = elm.hidden(X[:5] + 0.3)
+    known = np.sum(at.T * np.linalg.solve(gram, at.T), axis=0)
+    assert_allclose(elm.leverage(X[:5] + 0.3), known, rtol=1e-9)
+
+
+def test_error_covariance_knows_noise():
+    """Half the outputs follow the task, the others do not."""
+    X, noise = samples(400, outputs=2)
+    y = np.column_stack([np.sin(X), 0.3 * noise])
+    found = ElmRegressor(alpha=1e-2, random_state=0).fit(X, y)
+    covariance = found.error_covariance_
+    assert_allclose(np.diag(covariance)[2:], 0.09, rtol=0.2)
+    assert np.diag(covariance)[:2].max() < 1e-3
+
+
+def test_many_outputs_have_no_covariance():
+    X, _ = samples(5)
+    elm = ElmRegressor(3, random_state=0).fit(X, np.ones((5, 2001)))
+    with pytest.raises(AttributeError, match="2000 outputs"):
+        _ = elm.error_covariance_
+
+
+def test_learning_leaves_the_data_alone():
+    X, y = samples(8)
+    kept = X.copy(), y.copy()
+    elm = ElmRegressor(random_state=0).fit(X, y)
+    # A column and a row are in LAPACK's order already.
+    elm.partial_fit(X[:1], y[:1])
+    flat = y[:, 0].copy()
+    ElmRegressor(random_state=0).fit(X, flat).partial_fit(X, flat)
+    assert np.array_equal(X, kept[0])
+    assert np.array_equal(y, kept[1])
+    assert np.array_equal(flat, kept[1][:, 0])
+
+
 def test_scaling_is_that_of_the_range_whatever_comes_first():
     near, far = samples(20)[0] * 0.01, samples(20)[0]
     elms = []

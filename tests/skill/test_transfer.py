@@ -204,7 +204,7 @@ def test_eq_5_minimised_elsewhere(skill):
     """Bare Eq. 5: a general-purpose search of the same starts is no better."""
     X, y = few(4)
     transfer = TransferRegressor(
-        skill, alpha=0.05, prior=None, average=False, n_starts=12
+        skill, alpha=0.05, prior=None, metric=None, average=False, n_starts=12
     ).fit(X, y)
 
     def cost(p):
@@ -277,9 +277,10 @@ def test_prior_keeps_to_the_domain(skill):
     # Outputs that no task of the domain has would pull far outside.
     X, y = few()
     y = y + 3.0
-    far = TransferRegressor(skill, prior=None, alpha=1e-6).fit(X, y)
+    far = TransferRegressor(skill, prior=None, metric=None, alpha=1e-6)
+    far.fit(X, y)
     near = TransferRegressor(
-        skill, prior="domain", noise=3.0, domain=[[-1, 1]] * 2
+        skill, prior="domain", metric=None, noise=3.0, domain=[[-1, 1]] * 2
     ).fit(X, y)
     assert np.abs(far.transform(X)).max() > 1.5
     assert np.abs(near.transform(X)).max() < 1.2
@@ -295,13 +296,14 @@ def test_metric_weighs_the_outputs(skill):
     assert covariance.shape == (4, 4)
     assert np.linalg.eigvalsh(covariance).min() > 0.0
     assert covariance[3, 3] > 100.0 * covariance[0, 0]
-    missed = {"none": [], "metric": [], "variances": []}
+    missed = {"none": [], "auto": [], "metric": [], "variances": []}
     Z_new = random.uniform(-1, 1, (100, 2))
     for _ in range(5):
         Z = random.uniform(-1, 1, (5, 2))
         y = np.column_stack([skill_of(Z, 3), 5.0 * random.normal(size=5)])
         for name, metric in (
             ("none", None),
+            ("auto", "auto"),
             ("metric", covariance),
             ("variances", np.diag(covariance)),
         ):
@@ -312,8 +314,8 @@ def test_metric_weighs_the_outputs(skill):
             )
             missed[name].append(np.mean(error**2))
     medians = {name: np.median(values) for name, values in missed.items()}
-    assert medians["metric"] < 0.2 * medians["none"]
-    assert medians["variances"] < 0.2 * medians["none"]
+    for name in ("auto", "metric", "variances"):
+        assert medians[name] < 0.2 * medians["none"]
 
 
 def test_metric_is_what_it_says():
@@ -447,6 +449,7 @@ def test_a_search_that_is_cut_short_warns(skill):
         ({"noise": 0.0}, "noise is 0.0"),
         ({"tol": np.nan}, "tol is nan"),
         ({"metric": np.eye(3)}, "metric has shape"),
+        ({"metric": "magic"}, "metric is 'magic'"),
         ({"metric": -np.eye(6)}, "not positive definite"),
         ({"domain": [[0, 1]]}, "domain is"),
         ({"domain": [[0, 1], [1, 1]]}, "domain is"),
