@@ -1,7 +1,6 @@
 """Speed of the learning core: DMP, ELM, transfer. See benchmark.py."""
 
 from collections.abc import Callable
-import importlib.util
 import time
 from typing import Any
 import warnings
@@ -57,14 +56,14 @@ def dmp() -> None:
     error = np.sqrt(np.mean((played.q - q) ** 2))
 
     their_encode = their_rollout = their_error = None
-    if importlib.util.find_spec("movement_primitives") is None:
+    try:
+        from movement_primitives.dmp import DMP
+    except ImportError as error:
         print(
-            "movement-primitives is not installed: no comparison "
-            "(pip install 'drake_affetto[bench]')"
+            f"movement-primitives is not installed ({error}): no comparison; "
+            "pip install movement-primitives pytransform3d"
         )
     else:
-        from movement_primitives.dmp import DMP
-
         theirs = DMP(_JOINTS, 3.0, 0.001, n_weights_per_dim=_BASES)
         their_encode = _seconds(lambda: theirs.imitate(t, q), tries=3)
         their_rollout = min(

@@ -84,7 +84,7 @@ print(f"{np.std(played.q - shown):.4f} rad (their noise: 0.002)")
 
 figure, axes = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
 axes[0].plot(t, shown, "k", lw=3, alpha=0.3, label=["shown", None])
-axes[0].plot(played.t, played.q, label=["shoulder", "elbow"])
+axes[0].plot(played.t, played.q, "--", label=["shoulder", "elbow"])
 axes[0].set(xlabel="time / s", ylabel="joint angle / rad")
 axes[0].legend(fontsize=8)
 axes[1].plot(t, dmp.basis(1.0 - t / 3.0))
@@ -224,7 +224,7 @@ for count in counts:
 print("   " + " " * 18 + "".join(f"{n:>8}" for n in counts))
 for name, row in table.items():
     print(f"   {name:<18}" + "".join(f"{value:8.1f}" for value in row))
-figure, axes = plt.subplots(figsize=(6, 3.6), layout="constrained")
+figure, axes = plt.subplots(figsize=(7, 3.6), layout="constrained")
 for name, row in table.items():
     axes.plot(counts, row, "o-", label=name)
 axes.set(
@@ -232,7 +232,7 @@ axes.set(
     ylabel="median miss / mm",
     yscale="log",
 )
-axes.legend(fontsize=7)
+figure.legend(fontsize=8, loc="outside right")
 save(figure, "5_schemes.png")
 
 # %% 6. What you know, put to use

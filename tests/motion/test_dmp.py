@@ -126,6 +126,16 @@ def test_samples_do_not_depend_on_their_distance(
     assert_allclose(coarse.q_ddot, fine.q_ddot[::3], atol=1e-6)
 
 
+@pytest.mark.parametrize("dt", [0.3, 0.07, 0.0333])
+def test_a_movement_may_end_within_a_step(dt):
+    dmp = Dmp(DmpConfig(duration=1.0))
+    theta, start = random_movement()
+    theta[14::15] = 100.0  # of great force until the very end
+    coarse = dmp.rollout(theta, start, dt, length=1.5)
+    fine = dmp.rollout(theta, start, dt / 100, length=1.5)
+    assert_allclose(coarse.q, fine.q[::100][: len(coarse.q)], atol=1e-7)
+
+
 def test_joints_follow_one_another_in_theta():
     dmp = Dmp()
     theta, start = random_movement(4)
