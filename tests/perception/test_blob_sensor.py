@@ -14,13 +14,15 @@ BACKGROUND, MARKER = (168, 117, 71), (13, 191, 38)
 BOX = BlobCalibration(20.0, 120.0, 10.0, 110.0)
 
 
-def picture(u=None, v=0, half=5, size=(160, 120)):
+def picture(u=None, v=0, radius=6.0, size=(160, 120)):
     image = ImageRgba8U(*size)
     data = image.mutable_data
     data[:, :, :3] = BACKGROUND
     data[:, :, 3] = 255
     if u is not None:
-        data[v - half : v + half + 1, u - half : u + half + 1, :3] = MARKER
+        y, x = np.mgrid[: size[1], : size[0]]
+        inside = (x - u) ** 2 + (y - v) ** 2 <= radius**2
+        data[:, :, :3][inside] = MARKER
     return image
 
 
@@ -37,7 +39,7 @@ def test_blob_is_normalised_over_the_calibrated_box(sensor):
     np.testing.assert_allclose(blob, [0.5, 0.25, 1.0], atol=1e-3)
     u, v, area, confidence = sensor.get_blob_pixels_output_port().Eval(context)
     np.testing.assert_allclose([u, v], [70, 35], atol=0.05)
-    assert area == pytest.approx(121, rel=0.15)
+    assert area == pytest.approx(np.pi * 36, rel=0.15)
     assert 0 < confidence <= 1
     # Outside of the box it says how far, and does not stick to the border.
     port.FixValue(context, picture(140, 60))
