@@ -37,8 +37,6 @@ from drake_affetto.perception.gaze_servo import GazeServo, gaze_view
 from drake_affetto.perception.mirror_camera import MirrorCamera
 from drake_affetto.perception.plant_sight import marker_radius
 from drake_affetto.pneumatics.actuation import PneumaticActuation
-from drake_affetto.pneumatics.chamber import Row
-from drake_affetto.pneumatics.parameters import resting_pressure
 from drake_affetto.scenario import Scenario
 from drake_affetto.scene import world
 from drake_affetto.skill.policy import SkillPolicy
@@ -227,15 +225,7 @@ class AffettoStation(Diagram):
         )
         torque = -gravity[self.joints.velocities]
         actuation = self._sub(self.actuation, context)
-        parameters = self.actuation.get_parameters(actuation)
-        K_a, K_b = parameters[Row.K_A], parameters[Row.K_B]
-        ambient, supply = parameters[Row.ATMOSPHERE], parameters[Row.SUPPLY]
-        rest = resting_pressure(parameters)
-        # K_a (p_a - p_0) - K_b (p_b - p_0) = torque, with mean pressure `rest`.
-        unequal = (K_a - K_b) * (rest - ambient)
-        difference = 2.0 * (torque - unequal) / (K_a + K_b)
-        p_a = np.clip(rest + 0.5 * difference, ambient, supply)
-        p_b = np.clip(rest - 0.5 * difference, ambient, supply)
+        p_a, p_b = self.actuation.pressures_for_torque(actuation, torque)
         self.actuation.set_pressures(actuation, p_a, p_b)
         if self.scenario.valve_source == "pidf":
             controller = self._sub(self.controller, context)
