@@ -208,8 +208,57 @@ def reward(recording: ArrayLike, prototypes: Sequence[ArrayLike]) -> float:
     return best
 
 
+def reward_over_time(
+    recording: ArrayLike, prototypes: Sequence[ArrayLike]
+) -> FloatArray:
+    """What Eq. 10 would be with the prototypes held at one place of Eq. 9.
+
+    Args:
+        recording: spectrogram (bands, t_s) of the trial.
+        prototypes: spectrograms (bands, t_p) of the demonstrations, all of
+            one length.
+
+    Returns:
+        (t_s - t_p + 1,) for the places o = 0, 1, ... [hops]; its greatest
+        value is `reward`.
+
+    Raises:
+        InputError: as `reward` does, or if the lengths differ.
+    """
+    trial = _spectrogram_array("recording", recording)
+    require(len(prototypes) > 0, "prototypes", "none", "at least one")
+    arrays = [_spectrogram_array("prototypes", p) for p in prototypes]
+    require(
+        len({array.shape for array in arrays}) == 1,
+        "prototypes",
+        sorted({array.shape for array in arrays}),
+        "one shape",
+    )
+    stack = np.stack(arrays)
+    rows, columns = _places(trial, stack)
+    norms = np.linalg.norm(columns, axis=1)
+    require(bool(norms.all()), "prototypes", "all zero", "sounds")
+    square = (
+        np.sum(rows**2, axis=1)[:, None] - 2.0 * rows @ columns.T + norms**2
+    )
+    # Where the two are alike the sum has lost its digits; it is near 0 then.
+    return np.max(1.0 - np.sqrt(np.maximum(square, 0.0)) / norms, axis=1)
+
+
 def _distances(recording: FloatArray, stack: FloatArray) -> FloatArray:
     """Least distances (N) of prototypes (N, bands, t_p) in a recording."""
+    rows, columns = _places(recording, stack)
+    # |a - b|^2 by correlation finds the place; there the difference itself is
+    # taken, because the sum loses all digits where the two are alike.
+    square = np.sum(rows**2, axis=1)[:, None] - 2.0 * rows @ columns.T
+    best = np.argmin(square, axis=0)
+    return np.linalg.norm(rows[best] - columns, axis=1)
+
+
+def _places(
+    recording: FloatArray, stack: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Each place of the recording (places, m), each prototype (N, m)."""
     count, bands, frames = stack.shape
     require(
         bands == recording.shape[0],
@@ -227,13 +276,7 @@ def _distances(recording: FloatArray, stack: FloatArray) -> FloatArray:
     places = np.lib.stride_tricks.sliding_window_view(
         recording, frames, axis=1
     ).swapaxes(0, 1)
-    rows = places.reshape(len(places), -1)
-    columns = stack.reshape(count, -1)
-    # |a - b|^2 by correlation finds the place; there the difference itself is
-    # taken, because the sum loses all digits where the two are alike.
-    square = np.sum(rows**2, axis=1)[:, None] - 2.0 * rows @ columns.T
-    best = np.argmin(square, axis=0)
-    return np.linalg.norm(rows[best] - columns, axis=1)
+    return places.reshape(len(places), -1), stack.reshape(count, -1)
 
 
 def cut_prototype(

@@ -5,7 +5,8 @@ killed starts again and finds what it had; two half-finished studies of the
 same trials join to a whole by copying rows.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+import dataclasses
 import hashlib
 import io
 import json
@@ -25,7 +26,14 @@ CREATE TABLE IF NOT EXISTS trials (
     spec TEXT NOT NULL,
     result TEXT NOT NULL,
     arrays BLOB,
-    finished_at TEXT NOT NULL DEFAULT CURRENT_TIMESTAMP
+    finished_at TEXT NOT NULL
+        DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now'))
+);
+CREATE TABLE IF NOT EXISTS plans (
+    label TEXT NOT NULL,
+    position INTEGER NOT NULL,
+    key TEXT NOT NULL,
+    PRIMARY KEY (label, position)
 )
 """
 
@@ -63,6 +71,21 @@ def unpack_arrays(data: bytes) -> dict[str, np.ndarray]:
         return {name: archive[name] for name in archive.files}
 
 
+@dataclasses.dataclass(frozen=True)
+class Stage:
+    """How far one stage of a study has come.
+
+    Attributes:
+        label: what it is called.
+        total: how many trials it consists of.
+        done: how many of them are finished.
+    """
+
+    label: str
+    total: int
+    done: int
+
+
 class TrialStore:
     """One study's trials; safe against a kill at any moment."""
 
@@ -77,7 +100,7 @@ class TrialStore:
             self._db = sqlite3.connect(self.path, timeout=30.0)
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("PRAGMA synchronous=NORMAL")
-            self._db.execute(_SCHEMA)
+            self._db.executescript(_SCHEMA)
             self._db.commit()
         except sqlite3.Error as error:
             raise InputError(
@@ -126,6 +149,69 @@ class TrialStore:
                 f"cannot write to {self.path}: {error}; "
                 f"{len(self)} finished trials are kept"
             ) from error
+
+    def plan(self, label: str, specs: Sequence[Mapping[str, Any]]) -> None:
+        """Keeps what a stage consists of, for `stages` to count.
+
+        Raises:
+            InputError: if it cannot be written.
+        """
+        rows = [(label, i, trial_key(spec)) for i, spec in enumerate(specs)]
+        try:
+            with self._db:
+                self._db.execute("DELETE FROM plans WHERE label = ?", (label,))
+                self._db.executemany("INSERT INTO plans VALUES (?, ?, ?)", rows)
+        except sqlite3.Error as error:
+            raise InputError(f"cannot write to {self.path}: {error}") from error
+
+    def stages(self) -> list[Stage]:
+        """The stages planned so far, in their order."""
+        rows = self._db.execute(
+            "SELECT label, COUNT(*), COUNT(trials.key) FROM plans "
+            "LEFT JOIN trials USING (key) GROUP BY label ORDER BY "
+            "MIN(plans.rowid)"
+        )
+        return [Stage(*row) for row in rows]
+
+    def absorb(self, path: str | Path) -> int:
+        """Takes over the finished trials of another study's file.
+
+        Trials have one key wherever they ran, so the halves of a study that
+        ran on two machines make up the whole one.
+
+        Returns:
+            How many trials were new.
+
+        Raises:
+            InputError: if there is no such file, or it holds no trials.
+        """
+        other = Path(path)
+        if not other.is_file():
+            raise InputError(f"no file of trials: {other}")
+        columns = "key, kind, spec, result, arrays, finished_at"
+        before = len(self)
+        try:
+            self._db.execute("ATTACH DATABASE ? AS other", (str(other),))
+            try:
+                with self._db:
+                    self._db.execute(
+                        f"INSERT OR IGNORE INTO trials ({columns}) "
+                        f"SELECT {columns} FROM other.trials"
+                    )
+            finally:
+                self._db.execute("DETACH DATABASE other")
+        except sqlite3.Error as error:
+            raise InputError(
+                f"cannot take trials over from {other}: {error}"
+            ) from error
+        return len(self) - before
+
+    def finished_at(self) -> list[str]:
+        """When each trial was finished, UTC in ISO 8601, earliest first."""
+        rows = self._db.execute(
+            "SELECT finished_at FROM trials ORDER BY finished_at"
+        )
+        return [row[0] for row in rows]
 
     def __len__(self) -> int:
         return self._db.execute("SELECT COUNT(*) FROM trials").fetchone()[0]

@@ -18,7 +18,8 @@ from drake_affetto.errors import InputError
 from drake_affetto.resources import models_dir
 from drake_affetto.scenario import Scenario, load_scenario
 from drake_affetto.skill.policy import Regressor
-from drake_affetto.studies.trials import TrialRunner
+from drake_affetto.sound.reward import reward_over_time
+from drake_affetto.studies.trials import Recording, TrialRunner
 
 # One runner, so one Diagram, for each scenario and process.
 _RUNNERS: dict[str, TrialRunner] = {}
@@ -82,14 +83,54 @@ def _spec(kind: str, scenario: str, **rest: Any) -> dict[str, Any]:
 
 
 def demonstration(
-    scenario: str, xy: Sequence[float], seed: int
+    scenario: str, xy: Sequence[float], seed: int, variability: float = 1.0
 ) -> dict[str, Any]:
     """Look for the drum at xy, be taught until the replay sounds.
+
+    `variability` scales how much the teacher's strokes differ.
 
     Result: found, tau (2), attempts, success, reward, max_pull. Arrays: theta
     (F), q (T, n), prototype (bands, frames); empty where nothing was found.
     """
-    return _spec("demonstration", scenario, xy=list(xy), seed=seed)
+    return _spec(
+        "demonstration",
+        scenario,
+        xy=list(xy),
+        seed=seed,
+        variability=variability,
+    )
+
+
+def look(scenario: str, xy: Sequence[float], seed: int) -> dict[str, Any]:
+    """Look for the drum at xy.
+
+    Result: found, tau (2), duration. Arrays: none.
+    """
+    return _spec("look", scenario, xy=list(xy), seed=seed)
+
+
+def strike(
+    scenario: str,
+    xy: Sequence[float],
+    seed: int,
+    theta: np.ndarray,
+    prototypes: np.ndarray,
+) -> dict[str, Any]:
+    """Play θ (F) with the drum at xy, judged by its sound.
+
+    What `drumming` does once the drum has been found; so one look serves all
+    that is tried at one place. `prototypes` are (N, bands, frames).
+
+    Result: reward, success, max_force, impulse. Arrays: reward_over_time.
+    """
+    return _spec(
+        "strike",
+        scenario,
+        xy=list(xy),
+        seed=seed,
+        theta=np.asarray(theta, float),
+        prototypes=np.asarray(prototypes, float),
+    )
 
 
 def drumming(
@@ -115,7 +156,12 @@ def drumming(
 
 def run_task(spec: Mapping[str, Any]) -> tuple[dict, dict[str, np.ndarray]]:
     """Runs one spec in this process."""
-    tasks = {"demonstration": _run_demonstration, "drumming": _run_drumming}
+    tasks = {
+        "demonstration": _run_demonstration,
+        "drumming": _run_drumming,
+        "look": _run_look,
+        "strike": _run_strike,
+    }
     if spec["kind"] not in tasks:
         raise InputError(f"no kind of trial is called {spec['kind']!r}")
     return tasks[spec["kind"]](spec)
@@ -140,7 +186,7 @@ def _run_demonstration(spec: Mapping[str, Any]):
         return result, arrays
     taps = trials.taps()
     for attempt in range(trials.scenario.teaching.max_attempts):
-        lesson = trials.teach(xy, seed, attempt)
+        lesson = trials.teach(xy, seed, attempt, spec["variability"])
         # The robot's own replay decides; each one has its own noise.
         recording = trials.play(xy, lesson.theta, seed + 7919 * (attempt + 1))
         value = trials.reward(recording, taps)
@@ -174,16 +220,45 @@ def _run_drumming(spec: Mapping[str, Any]):
     }
     if recording is None:
         return result, {}
-    value = trials.reward(recording, spec["prototypes"])
+    result.update(_judge(trials, recording, spec["prototypes"]))
+    return result, {}
+
+
+def _run_look(spec: Mapping[str, Any]):
+    trials = runner(spec["scenario"]["name"])
+    seen = trials.look(np.array(spec["xy"]), spec["seed"])
+    result = {
+        "found": seen.found,
+        "tau": seen.task_parameter.tolist(),
+        "duration": seen.duration,
+    }
+    return result, {}
+
+
+def _run_strike(spec: Mapping[str, Any]):
+    trials = runner(spec["scenario"]["name"])
+    recording = trials.play(np.array(spec["xy"]), spec["theta"], spec["seed"])
+    heard = trials.spectrogram(recording)
+    course = reward_over_time(heard, spec["prototypes"])
+    result = _judge(trials, recording, spec["prototypes"])
+    return result, {"reward_over_time": course.astype(np.float32)}
+
+
+def _judge(
+    trials: TrialRunner,
+    recording: Recording,
+    prototypes: Sequence[np.ndarray],
+) -> dict[str, Any]:
+    """The reward, from the sound; and what happened, to hold against it."""
+    value = trials.reward(recording, prototypes)
     force = recording.contact_force[:, 0]
     step = recording.t[1] - recording.t[0]
-    result.update(
-        reward=value,
-        success=bool(value > trials.reward_config.threshold),
-        max_force=float(force.max()),
-        impulse=float(force.sum() * step),
-    )
-    return result, {}
+    return {
+        "reward": value,
+        "success": bool(value > trials.reward_config.threshold),
+        "max_force": float(force.max()),
+        "impulse": float(force.sum() * step),
+    }
 
 
 def draw_positions(

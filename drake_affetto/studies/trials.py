@@ -5,6 +5,7 @@ trials change the context only, and what a trial gives depends on its
 arguments alone, not on the trials before it.
 """
 
+from collections.abc import Sequence
 import dataclasses
 
 import numpy as np
@@ -159,7 +160,7 @@ class TrialRunner:
         )
 
     def reward(
-        self, recording: Recording, prototypes: list[np.ndarray]
+        self, recording: Recording, prototypes: Sequence[np.ndarray]
     ) -> float:
         """R of paper Eq. 10, from the sound alone."""
         return reward(self.spectrogram(recording), prototypes)
@@ -184,14 +185,22 @@ class TrialRunner:
         self._watch(seed)
         return self._wait_for_gaze(begin)
 
-    def teach(self, xy: np.ndarray, seed: int, attempt: int = 0) -> Lesson:
+    def teach(
+        self,
+        xy: np.ndarray,
+        seed: int,
+        attempt: int = 0,
+        variability: float = 1.0,
+    ) -> Lesson:
         """Guides the arm to the drum at xy (2,), m, and back.
 
         Args:
             seed: of what differs between demonstrations.
             attempt: how often this position was tried before.
+            variability: by how much more than the scenario says
+                demonstrations differ.
         """
-        teaching = self.scenario.teaching
+        teaching = self.scenario.teaching.varied(variability)
         station = self.station
         begin = self._start(xy)
         # Eq. 8: what holds the arm at rest will hold it while it is led.

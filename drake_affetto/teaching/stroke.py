@@ -8,6 +8,7 @@ the hand and correcting what is left of the error.
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 
@@ -81,6 +82,15 @@ class TeacherConfig:
     firmer_depth: float = 0.005
     firmer_dwell: float = 0.06
     max_attempts: int = 4
+
+    def varied(self, factor: float) -> "TeacherConfig":
+        """A teacher whose demonstrations differ `factor` times as much."""
+        changed: dict[str, Any] = {"aim_sd": factor * self.aim_sd}
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, Variation):
+                changed[field.name] = Variation(value.mean, factor * value.sd)
+        return dataclasses.replace(self, **changed)
 
     def check(self, where: str) -> None:
         """Raises InputError for the first field that does not fit."""

@@ -15,6 +15,7 @@ from drake_affetto.sound.reward import (
     RewardConfig,
     cut_prototype,
     reward,
+    reward_over_time,
     similarity,
     spectrogram,
     tap_prototypes,
@@ -306,3 +307,23 @@ def test_a_part_of_the_settings_leaves_the_rest(tmp_path):
     expected.voice.membrane.tension = 150.0
     assert config == expected
     assert dataclasses.replace(config.reward) == RewardConfig()
+
+
+def test_reward_over_time_peaks_at_the_reward():
+    rng = np.random.default_rng(5)
+    trial = rng.random((6, 40))
+    prototypes = [rng.random((6, 9)) for _ in range(3)]
+    prototypes.append(trial[:, 13:22] + 1e-3 * rng.random((6, 9)))
+    course = reward_over_time(trial, prototypes)
+    assert course.shape == (40 - 9 + 1,)
+    assert np.argmax(course) == 13
+    assert course.max() == pytest.approx(reward(trial, prototypes), abs=1e-6)
+    # Each place alone, by the definition.
+    for o in (0, 7, 31):
+        by_hand = max(
+            1.0 - np.linalg.norm(trial[:, o : o + 9] - p) / np.linalg.norm(p)
+            for p in prototypes
+        )
+        assert course[o] == pytest.approx(by_hand, abs=1e-9)
+    with pytest.raises(InputError, match="one shape"):
+        reward_over_time(trial, [prototypes[0], prototypes[1][:, :5]])

@@ -144,3 +144,25 @@ def test_a_bad_configuration_is_named(field, value):
     config = dataclasses.replace(TeacherConfig(), **{field: value})
     with pytest.raises(InputError, match=f"teaching.{field}"):
         config.check("teaching")
+
+
+def test_variability_scales_what_differs_and_nothing_else():
+    config = TeacherConfig()
+    assert config.varied(1.0) == config
+    same, twice = config.varied(0.0), config.varied(2.0)
+    touching = np.array([0.2, 0.0, 0.1])
+
+    def strokes(teacher):
+        return [
+            draw_stroke(teacher, touching, np.random.default_rng(seed))
+            for seed in range(20)
+        ]
+
+    assert np.ptp([s.target for s in strokes(same)], axis=0).max() == 0.0
+    spread, wider = (
+        np.std([s.target for s in strokes(teacher)], axis=0)
+        for teacher in (config, twice)
+    )
+    np.testing.assert_allclose(wider, 2.0 * spread, rtol=1e-6)
+    assert twice.max_force == config.max_force
+    assert twice.lift.mean == config.lift.mean
