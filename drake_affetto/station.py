@@ -28,6 +28,7 @@ from pydrake.systems.primitives import (
 from pydrake.systems.sensors import CameraInfo
 
 from drake_affetto.control.pidf_controller import PidfController
+from drake_affetto.errors import require
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.motion.dmp_source import DmpSource
 from drake_affetto.perception.analytic_blob_sensor import AnalyticBlobSensor
@@ -42,6 +43,7 @@ from drake_affetto.scene import world
 from drake_affetto.skill.policy import SkillPolicy
 from drake_affetto.sound.microphone import DrumMicrophone
 from drake_affetto.teaching.kinesthetic_teacher import KinestheticTeacher
+from drake_affetto.teaching.mouse_teacher import MouseTeacher
 
 _MODES = {"centre": GazeMode.CENTRE, "fixed_yaw": GazeMode.FIXED_YAW}
 
@@ -112,6 +114,8 @@ class AffettoStation(Diagram):
         scenario: Scenario,
         meshcat: Meshcat | None = None,
         meshcat_params: MeshcatVisualizerParams | None = None,
+        *,
+        by_mouse: bool = False,
     ):
         """Builds the diagram.
 
@@ -119,12 +123,21 @@ class AffettoStation(Diagram):
             scenario: from `load_scenario`; it is checked again.
             meshcat: shows the robot there as it moves.
             meshcat_params: how it is shown; Drake's defaults if None.
+            by_mouse: whoever drags the hand in `meshcat` teaches, in place of
+                the simulated teacher (Ctrl and the left button).
 
         Raises:
-            InputError: if the scenario does not fit itself or the models.
+            InputError: if the scenario does not fit itself or the models, or
+                this version of Drake has no mouse spring.
         """
         super().__init__()
         scenario.check()
+        require(
+            meshcat is not None or not by_mouse,
+            "by_mouse",
+            by_mouse,
+            "False without a meshcat",
+        )
         self.scenario = scenario
         builder = DiagramBuilder()
         self.plant: MultibodyPlant
@@ -144,7 +157,7 @@ class AffettoStation(Diagram):
             ]
         )
         self._estimated_state = self._add_estimation(builder)
-        self._add_teacher(builder)
+        self._add_teacher(builder, meshcat if by_mouse else None)
         self._add_actuation(builder)
         self._add_sight(builder)
         self._add_hearing(builder)
@@ -302,25 +315,34 @@ class AffettoStation(Diagram):
         )
         return select.get_output_port()
 
-    def _add_teacher(self, builder: DiagramBuilder) -> None:
-        self.teacher = builder.AddNamedSystem(
-            "kinesthetic_teacher",
-            KinestheticTeacher(
-                self.plant, self.joints.names, self.scenario.teaching
-            ),
-        )
-        builder.Connect(
-            self._estimated_state,
-            self.teacher.get_estimated_state_input_port(),
-        )
-        builder.Connect(
-            self.teacher.get_spatial_force_output_port(),
-            self.plant.get_applied_spatial_force_input_port(),
-        )
-        builder.ExportOutput(
-            self.teacher.get_pulling_force_output_port(),
-            "teacher.pulling_force",
-        )
+    def _add_teacher(
+        self, builder: DiagramBuilder, mouse: Meshcat | None
+    ) -> None:
+        teaching = self.scenario.teaching
+        if mouse is not None:
+            self.mouse_teacher = MouseTeacher.AddToBuilder(
+                builder=builder,
+                plant=self.plant,
+                scene_graph=self.scene_graph,
+                meshcat=mouse,
+                config=teaching,
+            )
+            pull = self.mouse_teacher.get_pulling_force_output_port()
+        else:
+            self.teacher = builder.AddNamedSystem(
+                "kinesthetic_teacher",
+                KinestheticTeacher(self.plant, self.joints.names, teaching),
+            )
+            builder.Connect(
+                self._estimated_state,
+                self.teacher.get_estimated_state_input_port(),
+            )
+            builder.Connect(
+                self.teacher.get_spatial_force_output_port(),
+                self.plant.get_applied_spatial_force_input_port(),
+            )
+            pull = self.teacher.get_pulling_force_output_port()
+        builder.ExportOutput(pull, "teacher.pulling_force")
 
     def _add_actuation(self, builder: DiagramBuilder) -> None:
         lower, upper = world.joint_limits(self.plant, self.joints.names)

@@ -105,10 +105,12 @@ class TrialRunner:
         meshcat_params: MeshcatVisualizerParams | None = None,
         *,
         start_time: float = 0.0,
+        by_mouse: bool = False,
     ):
         """Builds the station; see `AffettoStation` for what is raised.
 
         Args:
+            by_mouse: whoever drags the hand in `meshcat` teaches.
             start_time: a whole number of seconds; from when the robot comes
                 to rest, for replays of several trials one after another.
         """
@@ -116,7 +118,10 @@ class TrialRunner:
         self._start_time = start_time
         builder = DiagramBuilder()
         self.station = builder.AddNamedSystem(
-            "station", AffettoStation(scenario, meshcat, meshcat_params)
+            "station",
+            AffettoStation(
+                scenario, meshcat, meshcat_params, by_mouse=by_mouse
+            ),
         )
         step = scenario.plant_config.time_step
         rates = {
@@ -202,8 +207,21 @@ class TrialRunner:
         """
         teaching = self.scenario.teaching.varied(variability)
         station = self.station
+        grasped = self._soften(xy)
+        stroke = draw_stroke(
+            teaching,
+            station.touching_position(self.context),
+            np.random.default_rng([seed, 0x7EAC4]),
+            attempt,
+        )
+        station.teacher.set_stroke(self._sub(station.teacher), stroke, grasped)
+        return self._write_lesson(grasped)
+
+    def _soften(self, xy: np.ndarray) -> float:
+        """Lets the arm be led, drum at xy (paper Eq. 8); returns the time."""
+        teaching, station = self.scenario.teaching, self.station
         begin = self._start(xy)
-        # Eq. 8: what holds the arm at rest will hold it while it is led.
+        # What holds the arm at rest will hold it while it is led.
         self._advance(begin + teaching.settling_time)
         u_eq = self._log("affetto.pid_output")[1].mean(axis=0)
         controller = self._sub(station.controller)
@@ -212,21 +230,16 @@ class TrialRunner:
             controller, gains.scaled(teaching.gain_scale)
         )
         station.set_equilibrium_offset(self.context, u_eq)
+        return begin + teaching.settling_time
 
-        stroke = draw_stroke(
-            teaching,
-            station.touching_position(self.context),
-            np.random.default_rng([seed, 0x7EAC4]),
-            attempt,
-        )
-        grasped = begin + teaching.settling_time
-        station.teacher.set_stroke(self._sub(station.teacher), stroke, grasped)
+    def _write_lesson(self, grasped: float) -> Lesson:
+        """Records what the hand is led through from `grasped` on, s."""
         self._clear_logs()
-        self._advance(grasped + teaching.duration)
+        self._advance(grasped + self.scenario.teaching.duration)
         t, state = self._log("affetto.estimated_state")
         _, pull = self._log("teacher.pulling_force")
         t = t - grasped
-        q = state[:, : station.num_joints]
+        q = state[:, : self.station.num_joints]
         return Lesson(
             t=t,
             q=q,

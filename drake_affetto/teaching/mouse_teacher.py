@@ -1,0 +1,256 @@
+"""A person pulls the robot's hand with the mouse, in the browser."""
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.geometry import Meshcat, SceneGraph
+from pydrake.lcm import DrakeLcm
+from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialForce, SpatialVelocity
+from pydrake.multibody.plant import (
+    ExternallyAppliedSpatialForce,
+    MultibodyPlant,
+)
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiagramBuilder,
+    DiscreteValues,
+    InputPort,
+    LeafSystem,
+    OutputPort,
+    System,
+)
+from pydrake.visualization import ApplyVisualizationConfig, VisualizationConfig
+
+from drake_affetto.errors import InputError
+from drake_affetto.teaching.stroke import TeacherConfig
+
+# The field by which Drake offers its mouse spring.
+_STIFFNESS = "mouse_interaction_stiffness"
+
+
+def require_mouse_spring() -> None:
+    """Raises InputError on a Drake that has no mouse spring."""
+    if not any(f.name == _STIFFNESS for f in VisualizationConfig.__fields__):
+        raise InputError(
+            "teaching by hand needs a Drake whose Meshcat has a mouse spring "
+            "(1.58 has it, 1.51 does not)"
+        )
+
+
+class MouseTeacher(LeafSystem):
+    """A teacher's arm between the mouse and the robot's hand.
+
+    Drake's mouse spring pulls at whatever body is dragged, as far as the mouse
+    goes, and from where the browser last drew the grabbed point, some
+    hundredths of a second ago: a stiff spring then shakes the arm. Here only
+    the hand can be taken hold of, the point that is grabbed stays where it was
+    grabbed, and stiffness, damping and strength are the teacher's own.
+
+    .. pydrake_system::
+
+        name: MouseTeacher
+        input_ports:
+        - mouse_force
+        - body_poses
+        - body_spatial_velocities
+        output_ports:
+        - spatial_force
+        - pulling_force
+
+    - mouse_force: list[ExternallyAppliedSpatialForce] of Drake's mouse spring.
+    - body_poses, body_spatial_velocities: of the plant.
+    - spatial_force: list[ExternallyAppliedSpatialForce], at most one entry.
+    - pulling_force: (3) its force, in the world, N; zero while nobody pulls.
+
+    The discrete state holds whether the hand is held, and where (in its own
+    frame, m).
+    """
+
+    def __init__(
+        self,
+        plant: MultibodyPlant,
+        config: TeacherConfig,
+        palm_frame: str = "right_palm",
+    ):
+        """Reads which body is the hand from a finalized `plant`.
+
+        Args:
+            plant: holds the robot.
+            config: the teacher's arm.
+            palm_frame: a frame on the body that may be pulled.
+
+        Raises:
+            InputError: if `config` does not fit.
+        """
+        super().__init__()
+        config.check("teaching")
+        self._config = config
+        hand = plant.GetFrameByName(palm_frame).body()
+        self._hand = hand.index()
+        # The mouse spring is as stiff, and critically damped for the hand.
+        self._mouse_damping = (config.stiffness * hand.default_mass()) ** 0.5
+        self._force_in = self.DeclareAbstractInputPort(
+            "mouse_force", Value([ExternallyAppliedSpatialForce()])
+        )
+        self._poses_in = self.DeclareAbstractInputPort(
+            "body_poses", Value([RigidTransform()])
+        )
+        self._velocities_in = self.DeclareAbstractInputPort(
+            "body_spatial_velocities", Value([SpatialVelocity()])
+        )
+        self._grip = self.DeclareDiscreteState(4)
+        self.DeclarePeriodicDiscreteUpdateEvent(
+            1.0 / config.update_rate, 0.0, self._update
+        )
+        needed = {
+            self._force_in.ticket(),
+            self._poses_in.ticket(),
+            self._velocities_in.ticket(),
+            self.xd_ticket(),
+        }
+        self._force_port = self.DeclareAbstractOutputPort(
+            name="spatial_force",
+            alloc=lambda: Value([ExternallyAppliedSpatialForce()]),
+            calc=self._calc_spatial_force,
+            prerequisites_of_calc=needed,
+        )
+        self._pulling_port = self.DeclareVectorOutputPort(
+            name="pulling_force",
+            size=3,
+            calc=self._calc_pulling_force,
+            prerequisites_of_calc=needed,
+        )
+
+    def get_mouse_force_input_port(self) -> InputPort:
+        """What the mouse spring asks for."""
+        return self._force_in
+
+    def get_spatial_force_output_port(self) -> OutputPort:
+        """The list for MultibodyPlant's applied_spatial_force."""
+        return self._force_port
+
+    def get_pulling_force_output_port(self) -> OutputPort:
+        """The force on the hand, (3) N in the world."""
+        return self._pulling_port
+
+    @staticmethod
+    def AddToBuilder(
+        *,
+        builder: DiagramBuilder,
+        plant: MultibodyPlant,
+        scene_graph: SceneGraph,
+        meshcat: Meshcat,
+        config: TeacherConfig,
+        palm_frame: str = "right_palm",
+    ) -> "MouseTeacher":
+        """Adds Drake's mouse spring and, between it and the plant, a teacher.
+
+        Args:
+            plant: finalized, in `builder`; its applied_spatial_force is still
+                free.
+
+        Raises:
+            InputError: if this version of Drake has no mouse spring.
+        """
+        require_mouse_spring()
+        hand = plant.GetFrameByName(palm_frame).body()
+        visualization = VisualizationConfig(
+            publish_illustration=False,
+            publish_proximity=False,
+            publish_contacts=False,
+            publish_inertia=False,
+        )
+        # Drake's stiffness is per kilogram of the body that is dragged.
+        setattr(
+            visualization, _STIFFNESS, config.stiffness / hand.default_mass()
+        )
+        ApplyVisualizationConfig(
+            visualization,
+            builder,
+            plant=plant,
+            scene_graph=scene_graph,
+            meshcat=meshcat,
+            lcm=DrakeLcm("memq://null"),
+        )
+        # Drake has connected the spring to the plant; the teacher stands
+        # between the two.
+        port = plant.get_applied_spatial_force_input_port()
+        spring = _source(builder, plant, port)
+        builder.Disconnect(spring, port)
+        teacher = builder.AddNamedSystem(
+            "mouse_teacher", MouseTeacher(plant, config, palm_frame)
+        )
+        builder.Connect(spring, teacher.get_mouse_force_input_port())
+        for name in ("body_poses", "body_spatial_velocities"):
+            builder.Connect(
+                plant.GetOutputPort(name), teacher.GetInputPort(name)
+            )
+        builder.Connect(teacher.get_spatial_force_output_port(), port)
+        return teacher
+
+    def _drag(self, context: Context) -> ExternallyAppliedSpatialForce | None:
+        """What the mouse spring would do to the hand."""
+        for force in self._force_in.Eval(context):
+            if force.body_index == self._hand:
+                return force
+        return None
+
+    def _update(self, context: Context, values: DiscreteValues) -> None:
+        drag = self._drag(context)
+        grip = values.get_mutable_value(self._grip)
+        if drag is None:
+            grip[:] = 0.0
+        elif grip[0] == 0.0:
+            grip[0] = 1.0
+            grip[1:] = drag.p_BoBq_B
+
+    def _pull(self, context: Context) -> tuple[np.ndarray, np.ndarray] | None:
+        """Point of the hand that is pulled, in its frame, and force (3) N."""
+        drag = self._drag(context)
+        if drag is None:
+            return None
+        config = self._config
+        X_WB = self._poses_in.Eval(context)[self._hand]
+        V_WB = self._velocities_in.Eval(context)[self._hand]
+
+        def move(p_BoBq_B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            V_WBq = V_WB.Shift(X_WB.rotation() @ p_BoBq_B)
+            return X_WB @ p_BoBq_B, V_WBq.translational()
+
+        p_WBq, v_WBq = move(drag.p_BoBq_B)
+        f = drag.F_Bq_W.translational() + self._mouse_damping * v_WBq
+        mouse = p_WBq + f / config.stiffness
+        grip = context.get_discrete_state(self._grip).value()
+        held = grip[1:].copy() if grip[0] else drag.p_BoBq_B
+        p_WBq, v_WBq = move(held)
+        force = config.stiffness * (mouse - p_WBq) - config.damping * v_WBq
+        size = float(np.linalg.norm(force))
+        if size > config.max_force:
+            force = force * (config.max_force / size)
+        return held, force
+
+    def _calc_spatial_force(self, context: Context, output: Value) -> None:
+        pull = self._pull(context)
+        if pull is None:
+            output.set_value([])
+            return
+        force = ExternallyAppliedSpatialForce()
+        force.body_index = self._hand
+        force.p_BoBq_B, f = pull
+        force.F_Bq_W = SpatialForce(tau=np.zeros(3), f=f)
+        output.set_value([force])
+
+    def _calc_pulling_force(
+        self, context: Context, output: BasicVector
+    ) -> None:
+        pull = self._pull(context)
+        output.SetFromVector(np.zeros(3) if pull is None else pull[1])
+
+
+def _source(
+    builder: DiagramBuilder, system: System, port: InputPort
+) -> OutputPort:
+    """The output that is connected to an input port."""
+    source, index = builder.connection_map()[(system, port.get_index())]
+    return source.get_output_port(index)
