@@ -6,8 +6,8 @@ and `about`; each demonstration is a group `demonstrations/000000`, ... with
 - datasets `t` (T,) and `q` (T, n), and where they exist `theta` (n K,),
   `task_parameter` (d,), `prototype` (bands, frames) and `drum_xy` (2,), each
   with a checksum and the attributes `unit` and `about`;
-- attributes `joint_names` (n), `attempt`, `scenario`, `version`, and where
-  they exist `seed` and `reward`.
+- attributes `joint_names` (n), `attempt`, `teacher`, `scenario`, `version`,
+  and where they exist `seed`, `reward` and `max_pull` [N].
 
 A demonstration is added to a copy, which then takes the file's place: whoever
 is stopped at any moment loses the one being written and nothing else.
@@ -97,6 +97,10 @@ class Demonstration:
     """Reward of the robot's own replay."""
     prototype: FloatArray | None = None
     """Spectrogram (bands, frames) of that replay's sound."""
+    max_pull: float | None = None
+    """Greatest force with which the teacher pulled [N]."""
+    teacher: str = ""
+    """Who taught: "simulated", "by mouse", or whatever is known."""
     scenario: str = ""
     """Name of the scenario, or of the log it was converted from."""
     version: str = drake_affetto.__version__
@@ -136,14 +140,13 @@ class Demonstration:
             require(0 <= self.seed < 2**63, "seed", self.seed, "0 to 2^63 - 1")
         self.attempt = int(self.attempt)
         require(self.attempt >= 0, "attempt", self.attempt, "at least 0")
-        if self.reward is not None:
-            self.reward = float(self.reward)
-            require(
-                bool(np.isfinite(self.reward)),
-                "reward",
-                self.reward,
-                "a finite number",
-            )
+        for field in ("reward", "max_pull"):
+            value = getattr(self, field)
+            if value is not None:
+                require(
+                    bool(np.isfinite(value)), field, value, "a finite number"
+                )
+                setattr(self, field, float(value))
 
     def _array(self, field: str, dimensions: int) -> None:
         """Makes the field an array of its own, of floats."""
@@ -378,7 +381,15 @@ def _write(group: h5py.Group, demonstration: Demonstration) -> None:
         dataset.attrs["unit"] = unit
         dataset.attrs["about"] = about
     group.attrs["joint_names"] = list(demonstration.joint_names)
-    for field in ("seed", "attempt", "reward", "scenario", "version"):
+    for field in (
+        "seed",
+        "attempt",
+        "reward",
+        "max_pull",
+        "teacher",
+        "scenario",
+        "version",
+    ):
         value = getattr(demonstration, field)
         if value is not None:
             group.attrs[field] = value
@@ -394,13 +405,19 @@ def _read(group: h5py.Group) -> Demonstration:
         for name in attributes["joint_names"]
     ]
     seed = attributes.get("seed")
-    reward = attributes.get("reward")
+    reward, max_pull = (
+        float(attributes[field]) if field in attributes else None
+        for field in ("reward", "max_pull")
+    )
     return Demonstration(
         **arrays,
         joint_names=tuple(names),
         seed=None if seed is None else int(seed),
         attempt=int(attributes["attempt"]),
-        reward=None if reward is None else float(reward),
+        reward=reward,
+        max_pull=max_pull,
+        # Files of earlier versions do not tell.
+        teacher=str(attributes.get("teacher", "")),
         scenario=str(attributes["scenario"]),
         version=str(attributes["version"]),
     )

@@ -34,6 +34,8 @@ PLAIN = (
     "seed",
     "attempt",
     "reward",
+    "max_pull",
+    "teacher",
     "scenario",
     "version",
 )
@@ -52,6 +54,8 @@ def make(seed=0, **changes) -> Demonstration:
         "task_parameter": [0.3, -0.2],
         "reward": 0.1 + rng.uniform(),
         "prototype": rng.uniform(size=(20, 25)),
+        "max_pull": 18.5,
+        "teacher": "simulated",
         "scenario": "drumming",
     }
     return Demonstration(**{**values, **changes})
@@ -75,6 +79,7 @@ def test_what_goes_in_comes_out(tmp_path):
         task_parameter=None,
         reward=None,
         prototype=None,
+        max_pull=None,
         scenario="größer als früher",
     )
     bare.seed = None
@@ -99,6 +104,17 @@ def test_more_than_ten_keep_their_order(tmp_path):
     write_demonstrations(path, [make(i) for i in range(11)])
     append_demonstration(path, make(11))
     assert [d.seed for d in read_demonstrations(path)] == list(range(12))
+
+
+def test_a_file_from_before_teachers_were_told_of_can_be_read(tmp_path):
+    path = tmp_path / "taught.h5"
+    append_demonstration(path, make())
+    with h5py.File(path, "r+") as file:
+        group = file["demonstrations/000000"]
+        del group.attrs["teacher"], group.attrs["max_pull"]
+    (found,) = read_demonstrations(path)
+    assert (found.teacher, found.max_pull) == ("", None)
+    assert append_demonstration(path, make(1)) == 2
 
 
 def test_the_file_tells_what_it_holds(tmp_path):
