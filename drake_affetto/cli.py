@@ -23,9 +23,15 @@ from drake_affetto.errors import InputError
 # Name of a command → its module in drake_affetto, and what it does.
 COMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("studies.demo", "teach, drum, look through the mirror, transfer"),
+    "drum": ("studies.drum", "learn to drum from demonstrations (Fig. 3)"),
+    "mirror": (
+        "studies.mirror",
+        "drum in a changed view, by transfer (Fig. 5)",
+    ),
     "look": ("studies.look", "show what the camera sees; calibrate it"),
     "toy": ("studies.toy", "the paper's toy experiment of transfer (Fig. 2)"),
     "identify": ("studies.identify", "fit the actuators to a robot's logs"),
+    "status": ("studies.status", "tell how far a study has come"),
     "view": ("view", "show the robot in a browser, with sliders"),
     "diagram": ("diagram", "draw a station's systems and their connections"),
 }

@@ -113,6 +113,32 @@ class SkillConfig:
 
 
 @dataclasses.dataclass
+class TransferConfig:
+    """How the skill is transferred to this scenario's view, by default.
+
+    Attributes:
+        mapping: the family of h. "affine": Hτ̂ + c; "similarity": a turn, a
+            scale and a shift; "optical": a mirror's plane is learned, and the
+            camera is known.
+        residual: whether what the map leaves over is learned too, as a smooth
+            departure.
+    """
+
+    mapping: str = "affine"
+    residual: bool = False
+
+    def check(self, where: str) -> None:
+        """Raises InputError naming the first field that does not fit."""
+        known = ("affine", "similarity", "optical")
+        require(
+            self.mapping in known,
+            f"{where}.mapping",
+            self.mapping,
+            f"one of {', '.join(known)}",
+        )
+
+
+@dataclasses.dataclass
 class Scenario:
     """What a station is built from; field names as in Drake's scenarios.
 
@@ -132,6 +158,7 @@ class Scenario:
         camera, mirrors, rendering, blob, gaze: see `perception`.
         look: by turning to the drum, or from a fixed yaw.
         skill, policy: see `skill`.
+        transfer: of a skill that was learned in another view.
         dmp: see `motion`.
         control: see `control`.
         pneumatics: see `pneumatics`.
@@ -181,6 +208,7 @@ class Scenario:
     gaze: GazeConfig = dataclasses.field(default_factory=GazeConfig)
     look: LookConfig = dataclasses.field(default_factory=LookConfig)
     skill: SkillConfig = dataclasses.field(default_factory=SkillConfig)
+    transfer: TransferConfig = dataclasses.field(default_factory=TransferConfig)
     policy: SkillPolicyConfig = dataclasses.field(
         default_factory=SkillPolicyConfig
     )

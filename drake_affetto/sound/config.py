@@ -2,6 +2,7 @@
 
 import dataclasses
 
+from drake_affetto.errors import require_range
 from drake_affetto.resources import resolve
 from drake_affetto.sound.reward import RewardConfig
 from drake_affetto.sound.voice import VoiceConfig
@@ -9,15 +10,24 @@ from drake_affetto.sound.voice import VoiceConfig
 
 @dataclasses.dataclass
 class SoundConfig:
-    """How the drum sounds and how its sound is judged."""
+    """How the drum sounds and how its sound is judged.
+
+    Attributes:
+        voice: of drum, shell, table and valves.
+        reward: Eqs. 9 and 10.
+        hit_impulse: what a simulation calls a hit of the head, N s, to hold
+            the reward against.
+    """
 
     voice: VoiceConfig = dataclasses.field(default_factory=VoiceConfig)
     reward: RewardConfig = dataclasses.field(default_factory=RewardConfig)
+    hit_impulse: float = 0.05
 
     def check(self, where: str) -> None:
         """Raises InputError naming the field that does not fit."""
         self.voice.check(f"{where}.voice")
         self.reward.check(f"{where}.reward")
+        require_range(f"{where}.hit_impulse", self.hit_impulse, 0.0, 10.0)
 
 
 def load_sound_config(

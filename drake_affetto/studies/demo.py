@@ -118,6 +118,11 @@ def run_demo(
     """
     from drake_affetto.scenario import load_scenario
     from drake_affetto.studies.pool import Crew
+    from drake_affetto.studies.skills import (
+        learn_skill,
+        stack_prototypes,
+        successful,
+    )
     from drake_affetto.studies.store import TrialStore
     from drake_affetto.studies.tasks import (
         demonstration,
@@ -163,9 +168,9 @@ def run_demo(
             "Teaching by hand",
             [demonstration("drumming", xy, next(seeds)) for xy in taught],
         )
-        good = [(r, a) for r, a in lessons if r["success"]]
-        prototypes = [a["prototype"] for _, a in good]
-        source = _fit_source(direct, good, seed)
+        good = successful(lessons)
+        source = learn_skill(direct.skill, good, seed)
+        prototypes = list(stack_prototypes(good))
         trials = crew.run(
             "Drumming at unseen positions",
             [
@@ -177,8 +182,8 @@ def run_demo(
             "Teaching before the mirror",
             [demonstration("mirror", xy, next(seeds)) for xy in taught_mirror],
         )
-        samples = [(r, a) for r, a in mirror_lessons if r["success"]]
-        skills = _fit_schemes(mirror, source, samples)
+        samples = successful(mirror_lessons)
+        skills = _fit_schemes(source, samples)
         # Every scheme meets the same positions and the same noise.
         mirror_seeds = [next(seeds) for _ in unseen_mirror]
         plan = [
@@ -194,6 +199,7 @@ def run_demo(
             console.print(f"{crew.reused} trials were there already")
 
     results = {
+        "study": "demo",
         "version": __version__,
         "seed": seed,
         "drumming": {
@@ -242,29 +248,13 @@ def run_demo(
     return results
 
 
-def _fit_source(scenario, lessons, seed: int):
-    """The parameterised skill from demonstrations one by one (Eqs. 3, 4)."""
-    from drake_affetto.errors import InputError
-    from drake_affetto.studies.skills import make_skill
-
-    if len(lessons) < 3:
-        raise InputError(
-            f"only {len(lessons)} demonstrations made a sound; a skill needs 3"
-        )
-    skill = make_skill(scenario.skill, seed)
-    for result, arrays in lessons:
-        skill.partial_fit([result["tau"]], [arrays["theta"]])
-    return skill
-
-
-def _fit_schemes(scenario, source, samples) -> dict[str, Any]:
+def _fit_schemes(source, samples) -> dict[str, Any]:
     from drake_affetto.studies.skills import fit_scheme
 
     tau = np.array([result["tau"] for result, _ in samples])
     theta = np.array([arrays["theta"] for _, arrays in samples])
     return {
-        name: fit_scheme(name, source, tau, theta, scenario.skill)
-        for name in SCHEMES
+        name: fit_scheme(name, source, tau, theta, "mirror") for name in SCHEMES
     }
 
 

@@ -89,22 +89,32 @@ class Stage:
 class TrialStore:
     """One study's trials; safe against a kill at any moment."""
 
-    def __init__(self, path: str | Path):
+    def __init__(self, path: str | Path, *, read_only: bool = False):
         """Opens or makes the file.
+
+        Args:
+            path: of the file.
+            read_only: to look at one that is there, also while it is written.
 
         Raises:
             InputError: if it cannot be written or is not such a file.
         """
         self.path = Path(path)
         try:
+            if read_only:
+                uri = f"{self.path.resolve().as_uri()}?mode=ro"
+                self._db = sqlite3.connect(uri, timeout=30.0, uri=True)
+                self._db.execute("SELECT key FROM trials LIMIT 1")
+                return
             self._db = sqlite3.connect(self.path, timeout=30.0)
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("PRAGMA synchronous=NORMAL")
             self._db.executescript(_SCHEMA)
             self._db.commit()
         except sqlite3.Error as error:
+            verb = "read" if read_only else "keep"
             raise InputError(
-                f"cannot keep trials in {self.path}: {error}"
+                f"cannot {verb} trials in {self.path}: {error}"
             ) from error
 
     def get(
@@ -156,7 +166,8 @@ class TrialStore:
         Raises:
             InputError: if it cannot be written.
         """
-        rows = [(label, i, trial_key(spec)) for i, spec in enumerate(specs)]
+        keys = dict.fromkeys(trial_key(spec) for spec in specs)
+        rows = [(label, i, key) for i, key in enumerate(keys)]
         try:
             with self._db:
                 self._db.execute("DELETE FROM plans WHERE label = ?", (label,))

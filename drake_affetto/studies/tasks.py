@@ -38,7 +38,8 @@ def set_runner(scenario: str, trial_runner: TrialRunner) -> None:
 
 
 @functools.cache
-def _models_digest() -> str:
+def models_digest() -> str:
+    """Tells this installation's models from any others."""
     digest = hashlib.sha256()
     root = models_dir()
     for path in sorted(root.rglob("*")):
@@ -55,7 +56,7 @@ def _fingerprint(scenario: str) -> dict[str, str]:
     return {
         "name": scenario,
         "values": hashlib.sha256(repr(loaded).encode()).hexdigest()[:16],
-        "models": _models_digest(),
+        "models": models_digest(),
         "version": __version__,
     }
 
@@ -89,8 +90,9 @@ def demonstration(
 
     `variability` scales how much the teacher's strokes differ.
 
-    Result: found, tau (2), attempts, success, reward, max_pull. Arrays: theta
-    (F), q (T, n), prototype (bands, frames); empty where nothing was found.
+    Result: xy, found, tau (2), attempts, success, reward, max_pull. Arrays:
+    theta (F), q (T, n), prototype (bands, frames); empty where nothing was
+    found.
     """
     return _spec(
         "demonstration",
@@ -173,6 +175,7 @@ def _run_demonstration(spec: Mapping[str, Any]):
     xy, seed = np.array(spec["xy"]), spec["seed"]
     look = trials.look(xy, seed)
     result: dict[str, Any] = {
+        "xy": spec["xy"],
         "found": look.found,
         "tau": look.task_parameter.tolist(),
         "attempts": 0,
@@ -261,18 +264,34 @@ def _judge(
     }
 
 
+def trial_seed(*numbers: int) -> int:
+    """A seed of its own for whatever the numbers name.
+
+    More repeats or positions leave the seeds of the others as they are.
+    """
+    return int(np.random.SeedSequence(numbers).generate_state(1)[0] >> 1)
+
+
 def draw_positions(
-    scenario: Scenario, count: int, rng: np.random.Generator
+    scenario: Scenario,
+    count: int,
+    rng: np.random.Generator,
+    workspace: float = 1.0,
 ) -> np.ndarray:
     """(count, 2) places for the drum, spread over the scenario's region.
 
     A scrambled Sobol sequence: random, but without gaps or clusters.
+
+    Args:
+        workspace: the share of the region's length and width, about its
+            middle, that is made use of.
     """
     from scipy.stats import qmc
 
     region = scenario.drum_region
-    low = np.array([region.x[0], region.y[0]])
-    high = np.array([region.x[1], region.y[1]])
+    corners = np.array([region.x, region.y]).T
+    middle = corners.mean(axis=0)
+    low, high = middle + workspace * (corners - middle)
     sampler = qmc.Sobol(2, rng=rng)
     bits = max(1, int(np.ceil(np.log2(max(count, 2)))))
     points = sampler.random_base2(bits)[:count]

@@ -344,6 +344,7 @@ def run(args: argparse.Namespace) -> int:
 
     console = Console()
     results: dict[str, Any] = {
+        "study": "toy",
         "version": __version__,
         "seed": args.seed,
         "seeds": args.seeds,

@@ -1,0 +1,88 @@
+"""What the long studies share: options, folder, workers, going on later."""
+
+import argparse
+from collections.abc import Iterator
+import contextlib
+from pathlib import Path
+from typing import Any
+
+from drake_affetto.errors import InputError, require_range
+from drake_affetto.output import prepare_output
+from drake_affetto.studies.pool import Crew
+from drake_affetto.studies.store import TrialStore
+from drake_affetto.studies.tasks import run_task
+
+STORE = "trials.sqlite"
+
+
+def add_study_arguments(parser: argparse.ArgumentParser, out: str) -> None:
+    """Declares the options that every long study has."""
+    parser.add_argument(
+        "--out", metavar="DIR", default=out, help="where results go"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, help="of everything that is random"
+    )
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--workers",
+        type=int,
+        default=2,
+        metavar="N",
+        help="worker processes; 0 runs all in this one",
+    )
+    where.add_argument(
+        "--dask",
+        metavar="ADDRESS",
+        help="hand the trials to the Dask cluster whose scheduler is there",
+    )
+    parser.add_argument(
+        "--reuse",
+        metavar="DIR",
+        action="append",
+        default=[],
+        help="take finished trials over from another study's folder",
+    )
+
+
+def check_study_arguments(args: argparse.Namespace) -> None:
+    """Raises InputError for the first shared option that does not fit."""
+    require_range("--seed", args.seed, 0, 2**31 - 1)
+    require_range("--workers", args.workers, 0, 256)
+    for folder in args.reuse:
+        if not (Path(folder) / STORE).is_file():
+            raise InputError(f"--reuse: there is no {STORE} in {folder}")
+
+
+@contextlib.contextmanager
+def campaign(args: argparse.Namespace, console: Any) -> Iterator[Crew]:
+    """The crew of a study that was called with the shared options.
+
+    Yields:
+        A crew whose trials are kept in the study's folder. On Ctrl-C the
+        console is told how to go on.
+    """
+    out = prepare_output(args.out)
+    with contextlib.ExitStack() as stack:
+        store = stack.enter_context(TrialStore(out / STORE))
+        for folder in args.reuse:
+            taken = store.absorb(Path(folder) / STORE)
+            console.print(f"{taken} finished trials taken over from {folder}")
+        executor = None
+        if args.dask is not None:
+            from drake_affetto.studies.cluster import cluster_executor
+
+            executor = stack.enter_context(cluster_executor(args.dask))
+        crew = stack.enter_context(
+            Crew(run_task, store, workers=args.workers, executor=executor)
+        )
+        try:
+            yield crew
+        except KeyboardInterrupt:
+            console.print(
+                f"{len(store)} finished trials are kept in {out}; the same "
+                "command goes on from there."
+            )
+            raise
+        if crew.reused:
+            console.print(f"{crew.reused} trials were finished already")
