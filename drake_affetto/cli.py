@@ -28,6 +28,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "studies.mirror",
         "drum in a changed view, by transfer (Fig. 5)",
     ),
+    "teach": ("studies.teach", "teach the robot by hand, into a file"),
     "look": ("studies.look", "show what the camera sees; calibrate it"),
     "toy": ("studies.toy", "the paper's toy experiment of transfer (Fig. 2)"),
     "identify": ("studies.identify", "fit the actuators to a robot's logs"),
