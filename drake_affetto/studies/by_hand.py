@@ -16,7 +16,7 @@ from drake_affetto.teaching.mouse_teacher import require_mouse_spring
 # How often is looked whether the hand is held, s.
 _POLL = 0.02
 # From where the person looks: how far, and from how far above the horizon.
-_DISTANCE = 0.6
+_DISTANCE = 0.45
 _TILT = np.radians(20.0)
 # A lamp above the drum, outside of what the mouse can take hold of.
 _LAMP = "/lesson/lamp"
@@ -98,8 +98,8 @@ def viewpoint(
         # The drum is right below the hand: any side will do.
         across = np.array([1.0, 0.0, 0.0])
     across /= np.linalg.norm(across)
-    # Not through the robot, which is behind its hand.
-    if across[0] < 0.0:
+    # From the robot's right and front: the mirror is on its left.
+    if across[0] < across[1]:
         across = -across
     along = along / np.linalg.norm(along)
     up = np.cross(across, along)
@@ -136,12 +136,13 @@ def teach_by_hand(
         meshcat = StartMeshcat()
     trials = HandsOnRunner(course.scenario, meshcat)
     console.print(
-        f"Open {meshcat.web_url()} and lay the windows so that you see both.\n"
+        f"Open {meshcat.web_url()} beside this window.\n"
         "While the lamp over the drum is green, take hold of the robot's right "
-        "hand: hold Ctrl,\nand drag with the left mouse button. The lamp turns "
-        f"red: within {course.scenario.teaching.duration:g} s lead the hand "
-        "onto\nthe drum, press a little, and lead it back. The drum's sound "
-        "decides."
+        "hand:\nhold Ctrl and drag it with the left mouse button. The lamp "
+        f"turns red: within\n{course.scenario.teaching.duration:g} s lead the "
+        "hand onto the drum, press a little, and lead it back.\n"
+        "Then the robot repeats it, and the drum's sound decides.",
+        soft_wrap=True,
     )
     outcomes: dict[int, Taught] = {}
     taps = trials.taps()

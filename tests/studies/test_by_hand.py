@@ -231,10 +231,11 @@ def test_the_stroke_lies_in_the_plane_of_the_screen(seed):
     eye, middle = viewpoint(palm, touching)
     view = middle - eye
     assert view @ (touching - palm) == pytest.approx(0.0, abs=1e-12)
-    # From before the robot, and from above.
-    assert eye[0] > middle[0] - 1e-9
-    assert eye[2] > middle[2] - 1e-9
-    assert np.linalg.norm(view) == pytest.approx(0.6)
+    # From the robot's right or front, not through it or the mirror on its
+    # left; and from above.
+    assert eye[0] - eye[1] > 0.4
+    assert eye[2] > middle[2] + 0.1
+    assert np.linalg.norm(view) == pytest.approx(0.45)
 
 
 def test_without_mouse_spring_there_is_a_clear_message(
