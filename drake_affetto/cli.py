@@ -32,6 +32,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "look": ("studies.look", "show what the camera sees; calibrate it"),
     "toy": ("studies.toy", "the paper's toy experiment of transfer (Fig. 2)"),
     "identify": ("studies.identify", "fit the actuators to a robot's logs"),
+    "tune": ("studies.tune", "tune the controllers' gains on the whole robot"),
     "status": ("studies.status", "tell how far a study has come"),
     "view": ("view", "show the robot in a browser, with sliders"),
     "diagram": ("diagram", "draw a station's systems and their connections"),
