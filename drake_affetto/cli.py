@@ -31,6 +31,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "teach": ("studies.teach", "teach the robot by hand, into a file"),
     "look": ("studies.look", "show what the camera sees; calibrate it"),
     "toy": ("studies.toy", "the paper's toy experiment of transfer (Fig. 2)"),
+    "report": ("studies.report", "the results of studies as one page"),
     "identify": ("studies.identify", "fit the actuators to a robot's logs"),
     "tune": ("studies.tune", "tune the controllers' gains on the whole robot"),
     "status": ("studies.status", "tell how far a study has come"),

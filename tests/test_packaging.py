@@ -88,7 +88,8 @@ def test_wheel_holds_the_package_and_every_model(wheel):
     assert not [name for name in held if "__pycache__" in name]
     expected = {
         path.relative_to(ROOT).as_posix()
-        for path in (ROOT / "drake_affetto").rglob("*.py")
+        for kind in ("py", "html", "css", "js", "jpg")
+        for path in (ROOT / "drake_affetto").rglob(f"*.{kind}")
     } | {
         f"drake_affetto/{path.relative_to(ROOT).as_posix()}"
         for path in (ROOT / "models").rglob("*")
@@ -96,6 +97,7 @@ def test_wheel_holds_the_package_and_every_model(wheel):
     }
     assert expected - held == set()
     assert "drake_affetto/models/package.xml" in held
+    assert "drake_affetto/studies/report/page.html" in held
 
 
 @pytest.mark.slow

@@ -1,0 +1,68 @@
+"""`affetto report`: the results of studies as one page that tells the story.
+
+The page is a single file that needs no network: charts, pictures, sounds and
+the replay are in it.
+"""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from drake_affetto.errors import require
+from drake_affetto.output import prepare_output, write_text_atomic
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares the command's options."""
+    parser.add_argument(
+        "folders",
+        metavar="DIR",
+        nargs="+",
+        type=Path,
+        help="the folder of a study: demo, drum, mirror, toy, ...",
+    )
+    parser.add_argument(
+        "--out",
+        metavar="FILE",
+        type=Path,
+        help="the page; without it report.html in the first DIR",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Writes the page; returns the exit code.
+
+    Raises:
+        InputError: if a folder does not fit or the page cannot be written.
+    """
+    path = args.out or args.folders[0] / "report.html"
+    written = write_report(args.folders, path)
+    size = written.stat().st_size / 1e6
+    print(f"{written} ({size:.1f} MB): open it in a browser")
+    return 0
+
+
+def write_report(folders: Sequence[Path], path: Path) -> Path:
+    """Writes one self-contained page about the studies in `folders`.
+
+    Args:
+        folders: of finished studies, each of another kind.
+        path: of the page; its folder is made if need be.
+
+    Returns:
+        The path, with a leading `~` expanded.
+
+    Raises:
+        InputError: if a folder is not that of a finished study with a place
+            on the page, two are of one kind, a file is damaged or of another
+            version, or the page cannot be written.
+    """
+    from drake_affetto.studies.report.data import read_sources
+    from drake_affetto.studies.report.page import make_page
+
+    path = Path(path).expanduser()
+    require(not path.is_dir(), "--out", str(path), "a file, not a folder")
+    page = make_page(read_sources(folders))
+    prepare_output(path.parent)
+    write_text_atomic(path, page)
+    return path
