@@ -1,20 +1,29 @@
 """Reads typed YAML, and says in one line what in it does not fit."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 import copy
 import dataclasses
 import difflib
 from pathlib import Path
 import types
 import typing
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from pydrake.common.yaml import yaml_load_typed
 import yaml
 
 from drake_affetto.errors import InputError
+from drake_affetto.resources import resolve
+
+
+class _Checked(Protocol):
+    """A dataclass with defaults that knows what values make sense."""
+
+    def check(self, where: str) -> None: ...
+
 
 Schema = TypeVar("Schema")
+Config = TypeVar("Config", bound=_Checked)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
@@ -78,6 +87,29 @@ def typed(
         AttributeError,
     ) as error:
         raise InputError(f"{where}: {error}") from error
+
+
+def load_config(
+    schema: type[Config], file: str | Path, overlays: Sequence[str | Path] = ()
+) -> Config:
+    """Reads a file over the defaults of `schema`, and checks the whole.
+
+    Args:
+        schema: a dataclass with defaults and a method `check(where)`.
+        file: the file, or its package:// URI.
+        overlays: further ones, each holding only what it changes.
+
+    Raises:
+        InputError: for a file or a value that does not fit, by name.
+    """
+    config = schema()
+    for item in (file, *overlays):
+        path = resolve(item)
+        config = typed(
+            schema, read_yaml(path), where=path.name, defaults=config
+        )
+    config.check(resolve(file).name)
+    return config
 
 
 def _fields(schema: Any) -> dict[str, Any]:

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from drake_affetto.errors import InputError, require, require_range
-from drake_affetto.resources import resolve
 
 DEFAULT_FILE = "package://drake_affetto/control.yaml"
 
@@ -160,19 +159,9 @@ def load_control(
         InputError: for a file or a value that does not fit, by name.
     """
     # Drake's YAML reader is behind this; the mathematics need none of it.
-    from drake_affetto.yaml_config import read_yaml, typed
+    from drake_affetto.yaml_config import load_config
 
-    parameters = ControlParameters()
-    for item in (file, *overlays):
-        path = resolve(item)
-        parameters = typed(
-            ControlParameters,
-            read_yaml(path),
-            where=path.name,
-            defaults=parameters,
-        )
-    parameters.check(Path(str(file)).name)
-    return parameters
+    return load_config(ControlParameters, file, overlays)
 
 
 @numba.njit(cache=True)

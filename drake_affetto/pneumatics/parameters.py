@@ -15,7 +15,6 @@ from drake_affetto.pneumatics.chamber import (
     chamber_flows,
     opening_fraction,
 )
-from drake_affetto.resources import resolve
 
 DEFAULT_FILE = "package://drake_affetto/pneumatics.yaml"
 
@@ -281,19 +280,9 @@ def load_parameters(
         InputError: for a file or a value that does not fit, by name.
     """
     # Drake's YAML reader is behind this; the mathematics need none of it.
-    from drake_affetto.yaml_config import read_yaml, typed
+    from drake_affetto.yaml_config import load_config
 
-    parameters = PneumaticParameters()
-    for item in (file, *overlays):
-        path = resolve(item)
-        parameters = typed(
-            PneumaticParameters,
-            read_yaml(path),
-            where=path.name,
-            defaults=parameters,
-        )
-    parameters.check(Path(str(file)).name)
-    return parameters
+    return load_config(PneumaticParameters, file, overlays)
 
 
 def resting_pressure(parameters: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drake_affetto.errors import InputError, require, require_range
-from drake_affetto.resources import resolve
 
 PID_FILE = "package://drake_affetto/robot_pid.yaml"
 COMMAND_MAXIMUM = 255.0
@@ -91,12 +90,9 @@ def load_stack(file: str | Path = PID_FILE) -> RobotStack:
         InputError: for a file or a value that does not fit, by name.
     """
     # Drake's YAML reader is behind this; the mathematics need none of it.
-    from drake_affetto.yaml_config import read_yaml, typed
+    from drake_affetto.yaml_config import load_config
 
-    path = resolve(file)
-    stack = typed(RobotStack, read_yaml(path), where=path.name)
-    stack.check(path.name)
-    return stack
+    return load_config(RobotStack, file)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -3,7 +3,6 @@
 import dataclasses
 
 from drake_affetto.errors import require_range
-from drake_affetto.resources import resolve
 from drake_affetto.sound.reward import RewardConfig
 from drake_affetto.sound.voice import VoiceConfig
 
@@ -40,11 +39,6 @@ def load_sound_config(
             value out of range.
     """
     # Drake's YAML reader, which the mathematics beside this do not need.
-    from drake_affetto.yaml_config import read_yaml, typed
+    from drake_affetto.yaml_config import load_config
 
-    path = resolve(uri)
-    config = typed(
-        SoundConfig, read_yaml(path), where=path.name, defaults=SoundConfig()
-    )
-    config.check(path.name)
-    return config
+    return load_config(SoundConfig, uri)
