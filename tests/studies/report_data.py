@@ -84,7 +84,6 @@ def _taught(rng, count, **more):
             "tau": _tau(xy),
             "attempts": 1 + int(i % 9 == 8),
             "reward": _reward(rng, True),
-            "success": True,
         }
         for i, xy in enumerate(_positions(rng, count))
     ]

@@ -155,7 +155,7 @@ def test_scenarios_serve_for_the_mirror_too(tmp_path):
     assert "ahead of everything else in 2 of 5 views: mirror and another" in (
         made.text
     )
-    assert "level in 1 of 5 views: camera rolled" in made.text
+    assert "and another scheme in 1 of 5 views: camera rolled" in made.text
     assert (
         "ahead of both transfers in 2 of 5 views: mirror moved (relearning "
         "from scratch) and robot moved (the unchanged skill)" in made.text
@@ -240,6 +240,10 @@ def test_active_choice_that_does_not_help_is_said_so(tmp_path):
     results["active"]["n_to_90"] = results["n_to_90"] + 2
     made = make(tmp_path, drum=results)
     assert "least certain did not help" in made.text
+    results["active"]["n_to_90"] = None
+    assert "Only the random order came to stay" in (
+        make(tmp_path, drum=results).text
+    )
     results["active"] = None
     made = make(tmp_path, drum=results)
     assert "least certain" not in made.text
@@ -294,6 +298,18 @@ def test_the_page_says_who_wins(tmp_path, winner, verdict, order, said):
             "\N{NO-BREAK SPACE}", " "
         ) in (made.text)
     assert ("another scheme did better" in made.text) == (verdict == "other")
+
+
+def test_what_is_not_significant_is_not_called_clear():
+    results = report_data.mirror("relearn")
+    for row in results["comparisons"]:
+        row.update(p=0.2, p_corrected=0.9)
+    found = words.judge(data.Contest.of_study(results, "mirror"), 5)
+    assert (found.winner, found.order) == ("equal", "not")
+    assert set(found.level) == set(words.SCHEMES) - {"relearn"}
+    assert "Not significantly behind: the unchanged skill" in found.text
+    assert "better, though not significantly, than transfer" in found.text
+    assert "clearly" not in found.text
 
 
 def test_a_shared_first_place_is_shared():

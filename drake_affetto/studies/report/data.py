@@ -66,7 +66,6 @@ _TAUGHT = {
     "tau": [float],
     "attempts": int,
     "reward": float,
-    "success": bool,
     "max_pull?": Maybe(float),
 }
 _CELL = {"success_rate": _RATE, "per_repeat?": [float], "rewards?": [float]}

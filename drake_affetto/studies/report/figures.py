@@ -321,7 +321,7 @@ def learning_curve(
             f"Lines are means over {repeats} repeats with other "
             "demonstrations, bands their 95 % confidence. "
             if several
-            else ""
+            else "Bands are the 95 % confidence of so many trials. "
         )
         + (
             "Dotted: the next demonstration is given where the skill is least "
@@ -509,7 +509,7 @@ def workspace(
                 f"{100 * row['xy'][0]:.1f}",
                 f"{100 * row['xy'][1]:.1f}",
                 f"{row['reward']:.2f}",
-                "hit" if row["success"] else "miss",
+                "hit" if row["reward"] > THRESHOLD else "miss",
             ]
             for kind, group in (("taught", taught), ("tested", tests))
             for row in group
@@ -812,7 +812,7 @@ def significance(contest: Contest, samples: int) -> Chart:
             effect = (
                 ""
                 if found.effect_size is None
-                else f"<br>effect size {found.effect_size:+.2f}"
+                else f"<br>effect size (Cohen's h) {found.effect_size:+.2f}"
             )
             hovers[-1].append(
                 f"{text(words.scheme(a))} − {text(words.scheme(b))}: "
@@ -860,7 +860,8 @@ def significance(contest: Contest, samples: int) -> Chart:
         f"significance-{samples}",
         f"With {words.number(samples, 'demonstration')}",
         "Row minus column, in percentage points; a star marks a difference "
-        "with a corrected p below 0.05. Touch a cell for p and effect size.",
+        "with a corrected p below 0.05. Touch a cell for p and effect size "
+        "(Cohen's h).",
         f"{len(clear)} of {len(rows)} pairs differ significantly"
         + (": " + "; ".join(f"{r[0]} {r[1]}" for r in clear) if clear else "")
         + ".",
@@ -916,6 +917,8 @@ def transfer_map(grid: dict[str, Any]) -> list[Chart]:
         net = points.reshape(n_rows, n_columns, 2)
         taught = np.array(grid[f"taught_{part}"], dtype=float).reshape(-1, 2)
         names = grid[f"{part}_names"]
+        # As in images.
+        downwards = names[1].startswith("y_img")
         traces: list[Any] = []
         for lines, key, label in (
             (net, "plus", "first direction"),
@@ -946,7 +949,7 @@ def transfer_map(grid: dict[str, Any]) -> list[Chart]:
                 y=[float(c[1]) for c in corners],
                 mode="markers+text",
                 text=["A", "B", "C", "D"],
-                textposition=_outward(corners),
+                textposition=_outward(corners, downwards),
                 textfont={"size": 14, "color": LIGHT["ink"]},
                 marker={"size": 7, "color": LIGHT["ink"]},
                 cliponaxis=False,
@@ -974,8 +977,7 @@ def transfer_map(grid: dict[str, Any]) -> list[Chart]:
             x={"title": {"text": text(names[0])}, "showgrid": False},
             y={"title": {"text": text(names[1])}, "showgrid": False},
         )
-        if part == "input" and names[1].startswith("y_img"):
-            # Images have their y downwards.
+        if downwards:
             figure.update_yaxes(autorange="reversed")
         charts.append(
             Chart(
@@ -1009,11 +1011,11 @@ def _gaps(values: np.ndarray) -> list[float | None]:
     return [None if math.isnan(v) else float(v) for v in values]
 
 
-def _outward(corners: list[np.ndarray]) -> list[str]:
+def _outward(corners: list[np.ndarray], downwards: bool) -> list[str]:
     """Where a label stands so that it does not lie on the net."""
     middle = np.mean(corners, axis=0)
     return [
-        ("top" if c[1] > middle[1] else "bottom")
+        ("top" if (c[1] > middle[1]) != downwards else "bottom")
         + (" right" if c[0] > middle[0] else " left")
         for c in corners
     ]

@@ -397,7 +397,7 @@ def _story(material: Material) -> str:
             f"must do: {leaders} did best, with "
             f"{words.percent(contest.rates[verdict.leaders[0]][n].mean)}"
             + (
-                ", statistically level with "
+                ", not significantly ahead of "
                 + words.joined([words.in_text(k) for k in verdict.level])
                 if verdict.level
                 else ""
@@ -479,12 +479,15 @@ def _short(material: Material) -> Section:
             tiles.append(
                 (
                     str(first),
-                    "demonstrations to reach 90 %, in random order",
-                    ""
-                    if not active
-                    else "not reached by choosing the next position"
-                    if chosen is None
-                    else f"{chosen} when the least certain position is next",
+                    "demonstrations until success stays at 90 %",
+                    "given in random order"
+                    + (
+                        ""
+                        if not active
+                        else "; never when the skill chooses"
+                        if chosen is None
+                        else f"; {chosen} when the least certain is next"
+                    ),
                 )
             )
         separation = drum["separation"]
@@ -509,7 +512,7 @@ def _short(material: Material) -> Section:
                     f"{words.in_text(best)}, {n} new demonstrations",
                     {
                         "transfer": "ahead of all other schemes",
-                        "equal": "level with another scheme, see below",
+                        "equal": "others not significantly behind or ahead",
                         "other": "another scheme did better, see below",
                     }[verdict.winner],
                 )
@@ -817,11 +820,12 @@ def _drum_words(drumming: Drumming, results: dict[str, Any] | None) -> str:
                 (True, False): "only the chosen order",
                 (False, True): "only the random order",
             }[random is None, chosen is None]
-            parts.append(f"{which} reached 90 %")
+            parts.append(f"{which} came to stay at 90 % or more")
         elif chosen < random:
             parts.append(
                 "giving the next demonstration where the skill is least "
-                f"certain reached 90 % after {chosen} rather than {random}"
+                f"certain brings success to 90 % or more after {chosen} "
+                f"rather than {random}"
             )
         else:
             parts.append(
@@ -904,9 +908,9 @@ def _mirror(material: Material) -> Section | None:
             '<h3 class="sub">What the transfer has found out</h3><p>'
             + esc(
                 f"The map h of {words.in_text(contest.map['scheme'])}, fitted "
-                f"to {words.number(contest.map['samples'], 'demonstration')}. "
-                "Solid and dotted lines are the same lines on both sides, "
-                "corners A to D the same corners."
+                f"to {words.number(contest.map['samples'], 'demonstration')} "
+                "(the first repeat's). Solid and dotted lines are the same "
+                "lines on both sides, corners A to D the same corners."
             )
             + "</p>",
             _pairs(nets),
@@ -1010,7 +1014,7 @@ def _scenario_rows(
                 ),
                 {
                     "transfer": "transfer",
-                    "equal": "level",
+                    "equal": "undecided",
                     "other": words.joined(
                         [words.scheme(k) for k in verdict.leaders]
                     ),
@@ -1034,7 +1038,11 @@ def _scenario_words(contests: dict[str, Contest]) -> tuple[str, str, str]:
     parts = []
     for winner, text in (
         ("transfer", "a transfer was ahead of everything else in"),
-        ("equal", "a transfer and another scheme were level in"),
+        (
+            "equal",
+            "no significant difference between a transfer and another scheme "
+            "in",
+        ),
         ("other", "another scheme was ahead of both transfers in"),
     ):
         found = by_winner[winner]

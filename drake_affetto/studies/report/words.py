@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import dataclasses
 from typing import Any
 
-from drake_affetto.studies.report.data import Contest, Rate
+from drake_affetto.studies.report.data import Comparison, Contest, Rate
 
 # By scheme: what it is called, shortly and in full, and what it does.
 SCHEMES: dict[str, tuple[str, str, str]] = {
@@ -150,7 +150,8 @@ def p_value(p: float | None) -> str:
     """As "p = 0.03", or that there was no test."""
     if p is None:
         return "not tested"
-    return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
+    text = "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def sentence(text: str) -> str:
@@ -165,8 +166,8 @@ class Verdict:
     Attributes:
         samples: how many demonstrations.
         leaders: the schemes with the highest mean rate.
-        level: others that cannot be told from the leaders: a test was made
-            and found no significant difference to any.
+        level: others that are not significantly behind any of the leaders,
+            where a test was made.
         order: whether the paper's order came out: "clear", "in the means",
             "not", or "" where its schemes were not all run.
         winner: "transfer" where only transfers lead, "equal" where another
@@ -206,10 +207,7 @@ def judge(contest: Contest, samples: int) -> Verdict:
         named = joined(
             [f"{in_text(n)} ({percent(rates[n].mean)})" for n in level]
         )
-        parts.append(
-            f"statistically level with "
-            f"{'it' if len(leaders) == 1 else 'them'}: {named}"
-        )
+        parts.append(f"not significantly behind: {named}")
     winner = _winner(leaders, level)
     if set(leaders) - set(TRANSFERS):
         parts.append(_beaten(contest, samples, rates, leaders))
@@ -253,17 +251,24 @@ def _beaten(
         max(ordered(others), key=lambda n: rates[n].mean),
     )
     compared = contest.compare(rival, ours, samples)
-    if compared.clear and compared.difference > 0:
-        relation = "clearly better than"
-    elif compared.difference >= _EQUAL and compared.p is None:
-        relation = "better than"
-    else:
-        relation = "as good as"
+    relation = _relation(compared)
     return (
         f"So {in_text(rival)} was {relation} transfer here "
         f"({percent(rates[rival].mean)} against {percent(rates[ours].mean)}, "
         f"{p_value(compared.p)})"
     )
+
+
+def _relation(compared: Comparison) -> str:
+    """How the first stands to the second, in words before the second."""
+    if abs(compared.difference) < _EQUAL:
+        return "as good as"
+    word = "better" if compared.difference > 0 else "worse"
+    if compared.clear:
+        return f"clearly {word} than"
+    if compared.p is None:
+        return f"{word} than"
+    return f"{word}, though not significantly, than"
 
 
 def _paper_order(
@@ -278,12 +283,10 @@ def _paper_order(
         p = p_value(compared.p)
         both = f"{percent(rates[b].mean)} against {percent(rates[a].mean)}"
         if difference <= -_EQUAL:
-            how = (
-                "clearly better than"
-                if compared.clear
-                else ("as good as" if compared.p is not None else "better than")
+            relation = _relation(contest.compare(b, a, samples))
+            failed.append(
+                f"{in_text(b)} was {relation} {in_text(a)} ({both}, {p})"
             )
-            failed.append(f"{in_text(b)} was {how} {in_text(a)} ({both}, {p})")
         elif difference < _EQUAL:
             failed.append(f"{in_text(b)} was as good as {in_text(a)} ({both})")
         elif not compared.clear:
