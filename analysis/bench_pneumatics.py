@@ -20,6 +20,7 @@ from drake_affetto.pneumatics.parameters import (
     resting_pressure,
 )
 from drake_affetto.scene.world import (
+    ACTIVE_JOINTS,
     WorldConfig,
     add_world,
     joint_limits,
@@ -28,16 +29,6 @@ from drake_affetto.scene.world import (
     select_joints,
 )
 
-ACTIVE = (
-    "waist_roll",
-    "waist_pitch",
-    "waist_yaw",
-    "right_shoulder_elevation",
-    "right_shoulder_abduction",
-    "right_shoulder_flexion",
-    "right_elbow_rotation",
-    "right_elbow_flexion",
-)
 _STEP = 0.001
 _SLICE = 0.25
 _TRIES = 9
@@ -213,7 +204,7 @@ def run() -> None:
     plant.Finalize()
     everything = joint_names(plant)
     print("CPU time a step of 1 ms; net = over the bare plant")
-    for names in (list(ACTIVE), everything):
+    for names in (list(ACTIVE_JOINTS), everything):
         bare, compiled, plain = measure(names)
         print(
             f"{len(names):3d} joints: bare plant {bare:.0f} us; compiled "

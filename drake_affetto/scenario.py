@@ -20,7 +20,7 @@ from drake_affetto.perception.config import (
 from drake_affetto.perception.gaze import GazeConfig
 from drake_affetto.pneumatics.actuation import PneumaticActuationConfig
 from drake_affetto.resources import models_dir
-from drake_affetto.scene.world import WorldConfig
+from drake_affetto.scene.world import ACTIVE_JOINTS, WorldConfig
 from drake_affetto.skill.policy import SkillPolicyConfig
 from drake_affetto.sound.config import load_sound_config
 from drake_affetto.teaching.stroke import TeacherConfig
@@ -186,16 +186,7 @@ class Scenario:
     )
     world: WorldConfig = dataclasses.field(default_factory=WorldConfig)
     active_joints: list[str] = dataclasses.field(
-        default_factory=lambda: [
-            "waist_roll",
-            "waist_pitch",
-            "waist_yaw",
-            "right_shoulder_elevation",
-            "right_shoulder_abduction",
-            "right_shoulder_flexion",
-            "right_elbow_rotation",
-            "right_elbow_flexion",
-        ]
+        default_factory=lambda: list(ACTIVE_JOINTS)
     )
     yaw_joint: str = "waist_yaw"
     drum_region: DrumRegion = dataclasses.field(default_factory=DrumRegion)

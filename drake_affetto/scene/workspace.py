@@ -58,16 +58,7 @@ class WorkspaceConfig:
     """
 
     active_joints: list[str] = dataclasses.field(
-        default_factory=lambda: [
-            "waist_roll",
-            "waist_pitch",
-            "waist_yaw",
-            "right_shoulder_elevation",
-            "right_shoulder_abduction",
-            "right_shoulder_flexion",
-            "right_elbow_rotation",
-            "right_elbow_flexion",
-        ]
+        default_factory=lambda: list(world.ACTIVE_JOINTS)
     )
     yaw_joint: str = "waist_yaw"
     direct_posture: dict[str, float] = dataclasses.field(default_factory=dict)

@@ -39,6 +39,18 @@ from drake_affetto.errors import InputError, require, require_range
 from drake_affetto.resources import configure_parser, resolve
 from drake_affetto.scene.kinematics import SerialChain
 
+ACTIVE_JOINTS = (
+    "waist_roll",
+    "waist_pitch",
+    "waist_yaw",
+    "right_shoulder_elevation",
+    "right_shoulder_abduction",
+    "right_shoulder_flexion",
+    "right_elbow_rotation",
+    "right_elbow_flexion",
+)
+"""The joints that drum, unless a scenario names others, in their order."""
+
 _PLACEMENT = "drum_placement"
 
 

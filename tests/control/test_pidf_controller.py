@@ -19,6 +19,7 @@ from drake_affetto.pneumatics.actuation import (
     PneumaticActuationConfig,
 )
 from drake_affetto.scene.world import (
+    ACTIVE_JOINTS,
     WorldConfig,
     add_world,
     get_joint,
@@ -172,18 +173,6 @@ def test_arguments_that_do_not_fit_are_named():
         PidfConfig(period=3.0).check("here")
 
 
-ACTIVE = [
-    "waist_roll",
-    "waist_pitch",
-    "waist_yaw",
-    "right_shoulder_elevation",
-    "right_shoulder_abduction",
-    "right_shoulder_flexion",
-    "right_elbow_rotation",
-    "right_elbow_flexion",
-]
-
-
 class Body:
     """The robot's body, its actuators and controllers."""
 
@@ -199,18 +188,18 @@ class Body:
         add_world(plant, WorldConfig())
         plant.Finalize()
         robot = plant.GetModelInstanceByName("affetto")
-        selection = select_joints(plant, ACTIVE)
-        self.lower, self.upper = joint_limits(plant, ACTIVE)
-        n = self.n = len(ACTIVE)
+        selection = select_joints(plant, ACTIVE_JOINTS)
+        self.lower, self.upper = joint_limits(plant, ACTIVE_JOINTS)
+        n = self.n = len(ACTIVE_JOINTS)
         self.actuation = PneumaticActuation.AddToBuilder(
             builder=builder,
             config=PneumaticActuationConfig(),
-            joint_names=ACTIVE,
+            joint_names=ACTIVE_JOINTS,
             q_lower=self.lower,
             q_upper=self.upper,
         )
         self.controller = PidfController.AddToBuilder(
-            builder=builder, config=PidfConfig(), joint_names=ACTIVE
+            builder=builder, config=PidfConfig(), joint_names=ACTIVE_JOINTS
         )
         self.reference = builder.AddSystem(
             ConstantVectorSource(np.zeros(2 * n))
@@ -260,12 +249,13 @@ class Body:
         lock_inactive(
             self.plant,
             plant_context,
-            ACTIVE,
-            dict(zip(ACTIVE, map(float, start), strict=True)),
+            ACTIVE_JOINTS,
+            dict(zip(ACTIVE_JOINTS, map(float, start), strict=True)),
         )
         gravity = -self.plant.CalcGravityGeneralizedForces(plant_context)
         torque = [
-            gravity[get_joint(self.plant, j).velocity_start()] for j in ACTIVE
+            gravity[get_joint(self.plant, j).velocity_start()]
+            for j in ACTIVE_JOINTS
         ]
         self.reference.get_mutable_source_value(
             self.reference.GetMyMutableContextFromRoot(context)
@@ -312,4 +302,4 @@ def test_arm_reaches_another_posture_and_rests_there(body):
 
 
 def test_default_gains_name_every_active_joint():
-    assert set(ACTIVE) <= set(load_control().gains)
+    assert set(ACTIVE_JOINTS) <= set(load_control().gains)
