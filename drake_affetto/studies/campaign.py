@@ -13,6 +13,7 @@ from drake_affetto.studies.store import TrialStore
 from drake_affetto.studies.tasks import run_task
 
 STORE = "trials.sqlite"
+WORKERS = 2
 
 
 def add_study_arguments(parser: argparse.ArgumentParser, out: str) -> None:
@@ -27,9 +28,10 @@ def add_study_arguments(parser: argparse.ArgumentParser, out: str) -> None:
     where.add_argument(
         "--workers",
         type=int,
-        default=2,
+        # Not the number itself: argparse would not see it beside --dask.
+        default=None,
         metavar="N",
-        help="worker processes; 0 runs all in this one",
+        help=f"worker processes ({WORKERS}); 0 runs all in this one",
     )
     where.add_argument(
         "--dask",
@@ -48,7 +50,8 @@ def add_study_arguments(parser: argparse.ArgumentParser, out: str) -> None:
 def check_study_arguments(args: argparse.Namespace) -> None:
     """Raises InputError for the first shared option that does not fit."""
     require_range("--seed", args.seed, 0, 2**31 - 1)
-    require_range("--workers", args.workers, 0, 256)
+    if args.workers is not None:
+        require_range("--workers", args.workers, 0, 256)
     for folder in args.reuse:
         if not (Path(folder) / STORE).is_file():
             raise InputError(f"--reuse: there is no {STORE} in {folder}")
@@ -74,7 +77,12 @@ def campaign(args: argparse.Namespace, console: Any) -> Iterator[Crew]:
 
             executor = stack.enter_context(cluster_executor(args.dask))
         crew = stack.enter_context(
-            Crew(run_task, store, workers=args.workers, executor=executor)
+            Crew(
+                run_task,
+                store,
+                workers=WORKERS if args.workers is None else args.workers,
+                executor=executor,
+            )
         )
         try:
             yield crew

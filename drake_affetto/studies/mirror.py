@@ -132,7 +132,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     default = MirrorPlan()
     which = parser.add_mutually_exclusive_group()
     which.add_argument(
-        "--scenario", default=default.scenario, help="name or YAML file"
+        "--scenario",
+        help=f"of the changed view, name or YAML file ({default.scenario})",
     )
     which.add_argument(
         "--all-scenarios",
@@ -170,7 +171,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Runs the study; returns the exit code."""
     plan = MirrorPlan(
-        scenario=args.scenario,
+        scenario=args.scenario or MirrorPlan.scenario,
         samples=tuple(sorted(args.samples)),
         repeats=args.repeats,
         evaluations=args.evaluations,

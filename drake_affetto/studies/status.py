@@ -71,11 +71,10 @@ def _print(folder: Path, store: TrialStore, console: Any) -> None:
         text += f", the last {_duration(ago.total_seconds())} ago"
     left = sum(stage.total - stage.done for stage in stages)
     speed = rate(times)
+    if left:
+        text += f"; {left} are planned and not finished"
     if left and speed:
-        text += (
-            f"; {left} are planned and not finished, about "
-            f"{_duration(left / speed)} at the last rate"
-        )
+        text += f", about {_duration(left / speed)} at the last rate"
     done = (folder / "results.json").is_file()
     console.print(text + ("; the results are written." if done else "."))
 
