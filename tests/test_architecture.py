@@ -17,7 +17,7 @@ PACKAGE = ROOT / "drake_affetto"
 # The way of the signal, then what is built on it. Nothing imports from a later
 # place; what stands in one place may import each other.
 ORDER = [
-    {"", "errors", "output", "resources", "yaml_config"},
+    {"", "columns", "errors", "output", "resources", "yaml_config"},
     {"scene"},
     {"perception"},
     {"skill"},

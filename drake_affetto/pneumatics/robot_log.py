@@ -4,7 +4,6 @@ Here alone live the robot's units: percent of a joint's range, kPa gauge, and
 commands of 0..255. What leaves this module is in rad and Pa absolute.
 """
 
-import csv
 import dataclasses
 import math
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_affetto.columns import read_columns
 from drake_affetto.errors import InputError, require, require_range
 
 PID_FILE = "package://drake_affetto/robot_pid.yaml"
@@ -146,42 +146,15 @@ def read_log(
         InputError: naming the file and what is wrong with it.
     """
     path = Path(path)
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            header = next(csv.reader(file), [])
-            columns = {name.strip(): i for i, name in enumerate(header)}
-            needed = ["t"]
-            for prefix in ("rq", "rpa", "rpb", "ca", "cb", "qdes"):
-                needed.append(f"{prefix}{joint}")
-            missing = [name for name in needed if name not in columns]
-            if missing:
-                raise InputError(
-                    f"{path}: no column {', '.join(missing)} (for joint "
-                    f"{joint}); it has {len(header)} columns"
-                )
-            wanted = needed + [
-                name
-                for name in (f"dqdes{joint}", f"q{joint}", f"dq{joint}")
-                if name in columns
-            ]
-            rows = []
-            for number, row in enumerate(csv.reader(file), start=2):
-                if not row:
-                    continue
-                try:
-                    rows.append([float(row[columns[name]]) for name in wanted])
-                except (ValueError, IndexError):
-                    raise InputError(
-                        f"{path}: line {number} has no number in each of the "
-                        f"columns {', '.join(wanted)}"
-                    ) from None
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not UTF-8 text") from error
-    if len(rows) < 2:
-        raise InputError(f"{path}: fewer than two rows")
-    data = dict(zip(wanted, np.array(rows).T, strict=True))
+    data = read_columns(
+        path,
+        [
+            "t",
+            *(f"{name}{joint}" for name in ("rq", "rpa", "rpb", "ca", "cb")),
+            f"qdes{joint}",
+        ],
+        [f"dqdes{joint}", f"q{joint}", f"dq{joint}"],
+    )
     for name, column in data.items():
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:

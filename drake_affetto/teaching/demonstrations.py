@@ -15,7 +15,6 @@ is stopped at any moment loses the one being written and nothing else.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 import contextlib
-import csv
 import dataclasses
 import fcntl
 import os
@@ -29,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import drake_affetto
+from drake_affetto.columns import read_columns
 from drake_affetto.errors import InputError, require, require_file
 from drake_affetto.output import atomic_path
 
@@ -282,7 +282,7 @@ def from_robot_csv(
             "a lower and a higher angle",
         )
         columns.append(f"q{list(joints).index(name)}")
-    table = _read_columns(path, columns)
+    table = np.stack(list(read_columns(path, columns).values()), axis=1)
     lower, upper = np.array([tuple(pair) for pair in limits.values()]).T
     try:
         return Demonstration(
@@ -294,33 +294,6 @@ def from_robot_csv(
         )
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
-
-
-def _read_columns(path: Path, columns: Sequence[str]) -> FloatArray:
-    """These columns of a CSV file with a header."""
-    rows = []
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            reader = csv.reader(file)
-            header = next(reader, [])
-            missing = [name for name in columns if name not in header]
-            if missing:
-                raise InputError(f"{path} has no column {missing[0]!r}")
-            places = [header.index(name) for name in columns]
-            for line, row in enumerate(reader, start=2):
-                if not row:
-                    continue
-                try:
-                    rows.append([float(row[place]) for place in places])
-                except (IndexError, ValueError) as error:
-                    raise InputError(
-                        f"{path}, line {line}: a number is missing in one of "
-                        f"the columns {', '.join(columns)}"
-                    ) from error
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"cannot read {path}: {_short(error)}") from error
-    require(len(rows) >= 2, str(path), f"{len(rows)} samples", "at least two")
-    return np.array(rows)
 
 
 @contextlib.contextmanager

@@ -339,8 +339,8 @@ def test_percent_of_range_become_angles(tmp_path):
 @pytest.mark.parametrize(
     ("rows", "header", "message"),
     [
-        (["0,1,1,1,1", "1,1,1,1,1"], "time,q0,q1,q5,ca0", "'t'"),
-        (["0,1,1,1,1", "1,1,1,1,1"], "t,q0,q1,q2,ca0", "'q5'"),
+        (["0,1,1,1,1", "1,1,1,1,1"], "time,q0,q1,q5,ca0", "no column t;"),
+        (["0,1,1,1,1", "1,1,1,1,1"], "t,q0,q1,q2,ca0", "no column q5;"),
         (["0,1,1,1,1", "1,1,1,x,1"], None, "line 3"),
         (["0,1,1,1,1", "1,1"], None, "line 3"),
         (["0,1,1,1,1", "1,1,1,nan,1"], None, "finite"),
