@@ -1,8 +1,8 @@
 """Teaching by mouse: somebody drags the hand in Meshcat, as a browser would."""
 
 import io
-import struct
 
+from mouse_messages import drag_message
 import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import EventStatus
@@ -25,26 +25,6 @@ HAS_SPRING = any(
     for f in VisualizationConfig.__fields__
 )
 FRAME = 1.0 / 60.0  # a browser's
-
-
-def drag_message(path, anchor=(), target=()):
-    """What the browser sends, in MessagePack."""
-
-    def text(value):
-        data = value.encode()
-        return bytes([0xD9, len(data)]) + data
-
-    def numbers(values):
-        packed = b"".join(b"\xcb" + struct.pack(">d", v) for v in values)
-        return bytes([0x90 | len(values)]) + packed
-
-    return (
-        b"\x84"
-        + (text("type") + text("mouse_drag"))
-        + (text("name") + text(path))
-        + (text("drag_anchor") + numbers(anchor))
-        + (text("drag_target") + numbers(target))
-    )
 
 
 class Person:
@@ -92,7 +72,7 @@ class Person:
         return EventStatus.DidNothing()
 
     def let_go(self):
-        self.meshcat._InjectWebsocketMessage(drag_message(""))
+        self.meshcat._InjectWebsocketMessage(drag_message())
         self.begin = None
 
 

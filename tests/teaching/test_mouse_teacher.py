@@ -1,7 +1,6 @@
 """A person's pull by mouse: where it acts, how strong, and on what."""
 
-import struct
-
+from mouse_messages import drag_message
 import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform, RotationMatrix
@@ -176,26 +175,6 @@ def test_whoever_lets_go_may_grab_another_point(plant, teacher):
     np.testing.assert_array_equal(pull(teacher, context).p_BoBq_B, second)
 
 
-def drag_message(path, anchor=(), target=()):
-    """What the browser sends, in MessagePack."""
-
-    def text(value):
-        data = value.encode()
-        return bytes([0xD9, len(data)]) + data
-
-    def numbers(values):
-        packed = b"".join(b"\xcb" + struct.pack(">d", v) for v in values)
-        return bytes([0x90 | len(values)]) + packed
-
-    return (
-        b"\x84"
-        + (text("type") + text("mouse_drag"))
-        + (text("name") + text(path))
-        + (text("drag_anchor") + numbers(anchor))
-        + (text("drag_target") + numbers(target))
-    )
-
-
 @needs_spring
 def test_drakes_own_mouse_spring_pulls_the_hand():
     builder = DiagramBuilder()
@@ -227,7 +206,7 @@ def test_drakes_own_mouse_spring_pulls_the_hand():
     np.testing.assert_allclose(
         hand.EvalPoseInWorld(mine).translation(), target, atol=1e-3
     )
-    meshcat._InjectWebsocketMessage(drag_message(""))
+    meshcat._InjectWebsocketMessage(drag_message())
     simulator.AdvanceTo(2.01)
     np.testing.assert_array_equal(
         force.Eval(teacher.GetMyContextFromRoot(context)), np.zeros(3)
