@@ -514,6 +514,42 @@ def test_separation_counts_every_trial():
         assert np.min(np.abs(edges - 0.15)) < 1e-9
 
 
+def test_tests_are_drawn_where_they_were():
+    results = report_data.drum(repeats=1)
+    taught, tests = results["taught"], results["final"]["positions"]
+    for chart, across, along in (
+        (
+            figures.workspace(taught, tests),
+            lambda row: 100 * row["xy"][1],
+            lambda row: 100 * row["xy"][0],
+        ),
+        (
+            figures.task_space(taught, tests),
+            lambda row: np.degrees(row["tau"][1]),
+            lambda row: row["tau"][0],
+        ),
+    ):
+        np.testing.assert_allclose(
+            chart.figure.data[0].x, [across(row) for row in taught]
+        )
+        hits = [row for row in tests if row["success"]]
+        misses = [row for row in tests if not row["success"]]
+        for name, rows in (("tested: hit", hits), ("tested: miss", misses)):
+            (drawn,) = [
+                t
+                for t in chart.figure.data
+                if t.name == name and t.x[0] is not None
+            ]
+            np.testing.assert_allclose(drawn.x, [across(r) for r in rows])
+            np.testing.assert_allclose(drawn.y, [along(r) for r in rows])
+            assert list(drawn.marker.color) == [r["reward"] for r in rows]
+        # Left is left: both axes grow towards the robot's left.
+        assert chart.figure.layout.xaxis.autorange == "reversed"
+        assert len(chart.rows) == len(taught) + len(tests)
+    taught[0]["tau"] = [0.1]
+    assert figures.task_space(taught, tests) is None
+
+
 def test_map_keeps_the_grid_together():
     grid = report_data.mirror()["map"]
     before, after = figures.transfer_map(grid)
@@ -833,7 +869,7 @@ def test_browser_can_be_led_by_keyboard(browser, demo):
             break
     kinds = [kind for kind, _ in reached]
     assert {"BUTTON", "AUDIO", "SUMMARY", "DIV"} <= set(kinds)
-    assert kinds.count("SUMMARY") == 3
+    assert kinds.count("SUMMARY") == 4
     for kind, outline in reached:
         if kind in ("BUTTON", "SUMMARY", "DIV"):
             assert outline != "none"

@@ -4,7 +4,7 @@ All colours are of `LIGHT`; the page exchanges them for those of the same name
 in `DARK` where the reader prefers that, and back, without drawing data anew.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 import dataclasses
 import html
 import math
@@ -407,10 +407,80 @@ def workspace(
     taught: list[dict[str, Any]], tests: list[dict[str, Any]]
 ) -> Chart:
     """Where was taught and tested, seen from above as the robot sees it."""
+    return _taught_and_tested(
+        taught,
+        tests,
+        # Across and along the table, cm.
+        lambda row: (100.0 * row["xy"][1], 100.0 * row["xy"][0]),
+        ("y [cm]", "x [cm]"),
+        key="workspace",
+        title="Where it was taught, where it was tested",
+        caption="The table from above, the robot below the picture. Crosses: "
+        "where the drum stood while teaching. Discs: where it stood in the "
+        "tests, coloured by the reward; a miss is a diagonal cross.",
+        x={
+            "title": {"text": "y: to the robot's left ← [cm]"},
+            "autorange": "reversed",
+            "constrain": "domain",
+        },
+        y={
+            "title": {"text": "x: forward → [cm]"},
+            "scaleanchor": "x",
+            "constrain": "domain",
+        },
+    )
+
+
+def task_space(
+    taught: list[dict[str, Any]], tests: list[dict[str, Any]]
+) -> Chart | None:
+    """The same places as the skill has them; None if they are not two numbers.
+
+    Rows whose `tau` is [y_img, q3* in rad].
+    """
+    if any(len(row["tau"]) != 2 for row in (*taught, *tests)):
+        return None
+    return _taught_and_tested(
+        taught,
+        tests,
+        lambda row: (math.degrees(row["tau"][1]), row["tau"][0]),
+        ("q3* [°]", "y_img"),
+        key="task-space",
+        title="The same places, as the skill has them",
+        caption="Two numbers say where the drum is: how far the upper body "
+        "has turned to centre the marker (q3*), and how high the marker then "
+        "stands in the picture (y_img). The skill learns from the crosses and "
+        "is asked at the discs.",
+        x={
+            "title": {"text": "turned to the left ← q3* [°]"},
+            "autorange": "reversed",
+        },
+        y={"title": {"text": "y_img"}, "autorange": "reversed"},
+    )
+
+
+def _taught_and_tested(
+    taught: list[dict[str, Any]],
+    tests: list[dict[str, Any]],
+    place: Callable[[dict[str, Any]], tuple[float, float]],
+    names: tuple[str, str],
+    *,
+    key: str,
+    title: str,
+    caption: str,
+    x: dict[str, Any],
+    y: dict[str, Any],
+) -> Chart:
+    def points(rows: list[dict[str, Any]]) -> dict[str, list[float]]:
+        return {
+            "x": [place(row)[0] for row in rows],
+            "y": [place(row)[1] for row in rows],
+        }
+
+    where = f"{names[1]} %{{y:.2f}}, {names[0]} %{{x:.2f}}"
     traces = [
         go.Scatter(
-            x=[100 * row["xy"][1] for row in taught],
-            y=[100 * row["xy"][0] for row in taught],
+            points(taught),
             name="taught",
             mode="markers",
             marker={
@@ -420,8 +490,7 @@ def workspace(
                 "line": {"width": 1.5, "color": LIGHT["muted"]},
             },
             opacity=1.0 if len(taught) < 60 else 0.5,
-            hovertemplate="taught at x %{y:.1f} cm, y %{x:.1f} cm"
-            "<extra></extra>",
+            hovertemplate=f"taught at {where}<extra></extra>",
         )
     ]
     for success, label, symbol in (
@@ -431,23 +500,24 @@ def workspace(
         rows = [row for row in tests if row["success"] is success]
         if not rows:
             continue
+        edge = {"width": 1.2, "color": LIGHT["ink"]}
+        rewards = [row["reward"] for row in rows]
         traces.append(
             go.Scatter(
-                x=[100 * row["xy"][1] for row in rows],
-                y=[100 * row["xy"][0] for row in rows],
+                points(rows),
                 name=label,
                 mode="markers",
                 marker={
                     "symbol": symbol,
                     "size": 13,
-                    "color": [row["reward"] for row in rows],
+                    "color": rewards,
                     "coloraxis": "coloraxis",
-                    "line": {"width": 1.2, "color": LIGHT["ink"]},
+                    "line": edge,
                 },
                 showlegend=False,
-                customdata=[row["reward"] for row in rows],
-                hovertemplate="reward %{customdata:.2f} at x %{y:.1f} cm, "
-                "y %{x:.1f} cm<extra>" + label + "</extra>",
+                customdata=rewards,
+                hovertemplate=f"reward %{{customdata:.2f}} at {where}"
+                f"<extra>{label}</extra>",
             )
         )
         # In the legend with one colour: there the markers have no reward.
@@ -461,22 +531,14 @@ def workspace(
                     "symbol": symbol,
                     "size": 11,
                     "color": LIGHT["mid_reward"],
-                    "line": {"width": 1.2, "color": LIGHT["ink"]},
+                    "line": edge,
                 },
             )
         )
     figure = _figure(
         traces,
-        x={
-            "title": {"text": "y: to the robot's left ← [cm]"},
-            "autorange": "reversed",
-            "constrain": "domain",
-        },
-        y={
-            "title": {"text": "x: forward → [cm]"},
-            "scaleanchor": "x",
-            "constrain": "domain",
-        },
+        x=x,
+        y=y,
         coloraxis={
             "cmin": 0,
             "cmax": 1,
@@ -494,20 +556,18 @@ def workspace(
     )
     hits = sum(row["success"] for row in tests)
     return Chart(
-        "workspace",
-        "Where it was taught, where it was tested",
-        "The table from above, the robot below the picture. Crosses: where "
-        "the drum stood while teaching. Discs: where it stood in the tests, "
-        "coloured by the reward; a miss is a diagonal cross.",
+        key,
+        title,
+        caption,
         f"{hits} of {len(tests)} tests hit the drum; "
         f"{len(taught)} positions were taught.",
         figure,
-        ("", "x [cm]", "y [cm]", "reward", "result"),
+        ("", names[1], names[0], "reward", "result"),
         [
             [
                 kind,
-                f"{100 * row['xy'][0]:.1f}",
-                f"{100 * row['xy'][1]:.1f}",
+                f"{place(row)[1]:.2f}",
+                f"{place(row)[0]:.2f}",
                 f"{row['reward']:.2f}",
                 "hit" if row["reward"] > THRESHOLD else "miss",
             ]
@@ -852,7 +912,7 @@ def significance(contest: Contest, samples: int) -> Chart:
                 ygap=2,
             )
         ],
-        x={"side": "bottom", "tickangle": -40, "showgrid": False},
+        x={"side": "bottom", "tickangle": -90, "showgrid": False},
         y={"autorange": "reversed", "showgrid": False},
     )
     clear = [row for row in rows if row[-1] == "yes"]
@@ -1156,7 +1216,8 @@ def condition_charts(conditions: list[dict[str, Any]]) -> list[Chart]:
                         f"condition-{len(charts)}",
                         f"{factor.capitalize()}: {value}",
                         "Success over the number of demonstrations, with "
-                        f"“{factor}” at “{value}”.",
+                        f"“{factor}” at “{value}”; whiskers are 95 % "
+                        "confidence.",
                         "demonstrations",
                         [
                             (row["samples"], row)

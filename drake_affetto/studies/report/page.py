@@ -750,6 +750,7 @@ def _drum(material: Material) -> Section | None:
             )
         )
     charts.append(figures.workspace(drumming.taught, drumming.tests))
+    seen = figures.task_space(drumming.taught, drumming.tests)
     if results:
         similarity = results.get("similarity")
         threshold = results["separation"]["threshold"]
@@ -770,6 +771,8 @@ def _drum(material: Material) -> Section | None:
                     results["separation"]["impulse_threshold"],
                 )
             )
+    if seen is not None and len(charts) % 2:
+        charts.insert(1 + len(charts) // 2, seen)
     body = (
         _lead(lead)
         + _verdict_list(
