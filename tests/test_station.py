@@ -235,3 +235,8 @@ def test_shut_valves_hold_the_air_by_the_polytropic_law():
     assert np.abs(q1 - q0).max() > 0.05
     exponent = 1.2
     np.testing.assert_allclose(p1 * V1**exponent, p0 * V0**exponent, rtol=1e-4)
+
+
+def test_who_teaches_by_mouse_needs_a_browser_to_do_it_in():
+    with pytest.raises(InputError, match="by_mouse"):
+        AffettoStation(load_scenario("drumming"), by_mouse=True)
