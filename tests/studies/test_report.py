@@ -388,6 +388,21 @@ def test_conditions_say_where_transfer_is_behind(tmp_path):
     assert min(v for row in heat.figure.data[0].z for v in row if v) < -20
 
 
+@pytest.mark.parametrize(
+    ("p", "said"),
+    [
+        (None, "not tested"),
+        (1.0, "p = 1"),
+        (0.0512, "p = 0.051"),
+        (0.0499, "p < 0.05"),
+        (0.0312, "p = 0.031"),
+        (1e-5, "p < 0.001"),
+    ],
+)
+def test_p_is_never_rounded_across_the_line(p, said):
+    assert words.p_value(p).replace("\N{NO-BREAK SPACE}", " ") == said
+
+
 def test_percent_never_rounds_to_certainty():
     def plain(share):
         return words.percent(share).replace("\N{NO-BREAK SPACE}", " ")

@@ -484,7 +484,7 @@ class Contest:
         }
         return cls(
             scenario=scenario,
-            samples=tuple(sorted(results["samples"])),
+            samples=tuple(sorted(set(results["samples"]))),
             trials=results["repeats"] * results["evaluations"],
             rates={
                 name: {

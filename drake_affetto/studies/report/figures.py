@@ -8,13 +8,14 @@ from collections.abc import Callable, Iterable, Sequence
 import dataclasses
 import html
 import math
+import textwrap
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 
 from drake_affetto.studies.report import words
-from drake_affetto.studies.report.data import THRESHOLD, Contest
+from drake_affetto.studies.report.data import THRESHOLD, Contest, Rate
 
 # By name; every value occurs once, so that either can be told from the other.
 # The schemes' are chosen to differ for colour-blind eyes too, and each has a
@@ -288,7 +289,8 @@ def learning_curve(
             )
         )
         rows += [
-            [label, point["n"], words.rate(_rate(point))] for point in curve
+            [label, point["n"], words.rate(Rate.of(point["success_rate"]))]
+            for point in curve
         ]
     traces.append(
         go.Scatter(
@@ -344,12 +346,6 @@ def learning_curve(
         rows,
         420,
     )
-
-
-def _rate(point: dict[str, Any]) -> Any:
-    from drake_affetto.studies.report.data import Rate
-
-    return Rate.of(point["success_rate"])
 
 
 def similarity(
@@ -1297,7 +1293,7 @@ def _condition_chart(
                 place,
                 words.scheme(row["scheme"]),
                 row["samples"],
-                words.rate(_rate(row)),
+                words.rate(Rate.of(row["success_rate"])),
             ]
             for place, row in points
         ],
@@ -1413,12 +1409,12 @@ def toy_errors(
         paper: the paper's figure, to be drawn as a line.
     """
     methods = [
-        (group, name, labels.get(group, {}).get(name, name), row)
+        (group, labels.get(group, {}).get(name, name), row)
         for group in ("transfer", "baselines")
         for name, row in figures[group].items()
     ]
     traces = []
-    for i, (group, name, label, row) in enumerate(methods):
+    for i, (group, label, row) in enumerate(methods):
         color = LIGHT["random" if group == "transfer" else "active"]
         seeds = [
             v for v in row["per_seed"].get("other_mse_mean", []) if v > 0.0
@@ -1439,29 +1435,28 @@ def toy_errors(
                 "</extra>",
             )
         )
-        del name
-    for group, label, color, symbol in (
+    for kind, title, color, symbol in (
         ("transfer", "transfer", "random", "circle"),
         ("baselines", "without transfer", "active", "square"),
     ):
         own = [
-            (i, row["other_mse_mean"], label_)
-            for i, (g, _, label_, row) in enumerate(methods)
-            if g == group and row["other_mse_mean"] > 0.0
+            (i, row["other_mse_mean"], label)
+            for i, (group, label, row) in enumerate(methods)
+            if group == kind and row["other_mse_mean"] > 0.0
         ]
         traces.append(
             go.Scatter(
                 x=[v for _, v, _ in own],
                 y=[i for i, _, _ in own],
                 mode="markers",
-                name=f"{label} (median)",
+                name=f"{title} (median)",
                 marker={
                     "symbol": symbol,
                     "size": 12,
                     "color": LIGHT[color],
                     "line": {"color": LIGHT["ink"], "width": 1.5},
                 },
-                customdata=[text(t) for _, _, t in own],
+                customdata=[text(label) for _, _, label in own],
                 hovertemplate="%{customdata}: median %{x:.3g}<extra></extra>",
             )
         )
@@ -1491,13 +1486,13 @@ def toy_errors(
         },
         y={
             "tickvals": list(range(len(methods))),
-            "ticktext": [_wrapped(label) for _, _, label, _ in methods],
+            "ticktext": [_wrapped(label) for _, label, _ in methods],
             "range": [len(methods) - 0.1, -0.5],
             "tickfont": {"size": 12},
         },
         **_with_lines(*lines),
     )
-    best = min(methods, key=lambda m: m[3]["other_mse_mean"])
+    _, best, least = min(methods, key=lambda m: m[2]["other_mse_mean"])
     return Chart(
         key,
         f"On the square {square}",
@@ -1505,7 +1500,7 @@ def toy_errors(
         "five that were; a pale dot is the mean of one seed, the bordered "
         "symbol the median over the seeds. Less is better; the axis is "
         "logarithmic.",
-        f"Lowest: {best[2]} with {best[3]['other_mse_mean']:.3g}.",
+        f"Lowest: {best} with {least['other_mse_mean']:.3g}.",
         figure,
         ("method", "on those", "on the others", "± over subsets", "95 %"),
         [
@@ -1516,7 +1511,7 @@ def toy_errors(
                 f"{row['other_mse_std']:.3g}",
                 f"{row['other_mse_p95']:.3g}",
             ]
-            for _, _, label, row in methods
+            for _, label, row in methods
         ],
         90 + 38 * len(methods),
     )
@@ -1524,6 +1519,4 @@ def toy_errors(
 
 def _wrapped(label: str, width: int = 18) -> str:
     """In lines of at most `width` letters where words allow it."""
-    import textwrap
-
     return "<br>".join(text(line) for line in textwrap.wrap(label, width))

@@ -510,7 +510,10 @@ def _short(material: Material) -> Section:
                 (
                     words.percent(contest.rates[best][n].mean),
                     f"{words.in_text(best)}, {n} new demonstrations",
-                    {
+                    f"of {words.number(contest.trials, 'trial')} each: too few "
+                    "to compare"
+                    if not contest.tested
+                    else {
                         "transfer": "ahead of all other schemes",
                         "equal": "others not significantly behind or ahead",
                         "other": "another scheme did better, see below",

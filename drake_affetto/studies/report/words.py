@@ -151,6 +151,8 @@ def p_value(p: float | None) -> str:
     if p is None:
         return "not tested"
     text = "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
+    if p < 0.05 <= float(f"{p:.2g}"):
+        text = "p < 0.05"
     return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
