@@ -90,7 +90,13 @@ def run(args: argparse.Namespace) -> int:
         )
         raise
     _print_tables(results, console)
-    console.print(f"Results, pictures, sounds and the replay are in {out}")
+    from drake_affetto.studies.report import write_report
+
+    page = write_report([out], out / "report.html")
+    console.print(
+        f"Results, pictures, sounds and the replay are in {out}; the page "
+        f"that shows them all is {page}"
+    )
     return 0
 
 

@@ -75,6 +75,7 @@ class MirrorPlan:
         variability: how much more than the scenario says the teacher varies.
         workspace: share of the region's length and width that is used.
         direct: the scenario in which the skill is learned.
+        name: of this plan among others in one store; it is shown.
         seed: of everything that is random.
     """
 
@@ -89,6 +90,7 @@ class MirrorPlan:
     variability: float = 1.0
     workspace: float = 1.0
     direct: str = "drumming"
+    name: str = ""
     seed: int = 0
 
     @property
@@ -260,7 +262,8 @@ def run_mirror(crew: Crew, plan: MirrorPlan) -> MirrorOutcome:
     direct = load_scenario(plan.direct)
     target = load_scenario(plan.scenario)
     # Stages are told apart by their names.
-    title = Path(plan.scenario).stem
+    among = f", {plan.name}" if plan.name else ""
+    title = Path(plan.scenario).stem + among
     kept: list[tuple[Any, dict[str, Any], np.ndarray, np.ndarray]] = []
     rows: list[dict[str, Any]] = []
     specs: list[Spec] = []
@@ -270,7 +273,7 @@ def run_mirror(crew: Crew, plan: MirrorPlan) -> MirrorOutcome:
         of = f"{repeat + 1} of {plan.repeats}"
         lessons = teach_places(
             crew,
-            f"Teaching by hand, {of}",
+            f"Teaching by hand{among}, {of}",
             plan.direct,
             plan.demonstrations,
             (plan.seed, SOURCE, repeat),

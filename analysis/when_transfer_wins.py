@@ -1,0 +1,164 @@
+"""When does transfer win? Three schemes over what may decide it.
+
+    python analysis/when_transfer_wins.py [--samples 3 4 5 8 12] [--repeats 3]
+        [--workers N] [--out out/conditions]
+
+Before the mirror, one thing at a time is changed from how the study `affetto
+mirror` has it: how much the teacher's demonstrations vary, how much of the
+workspace is used, and whether samples are taken at random or spread out. In
+each condition relearning, transfer in the paper's form and the default transfer
+are given 3 to 12 samples. Every trial is simulated in full. Goes on where it
+was interrupted. Writes results.json, which `affetto report` takes, and
+when_transfer_wins.png.
+"""
+
+import argparse
+import dataclasses
+from pathlib import Path
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+from rich.console import Console
+
+from drake_affetto import __version__
+from drake_affetto.errors import InputError
+from drake_affetto.output import atomic_path, prepare_output, write_json
+from drake_affetto.studies.campaign import (
+    add_study_arguments,
+    campaign,
+    check_study_arguments,
+)
+from drake_affetto.studies.mirror import MirrorPlan, run_mirror
+
+# Factor and value, and what that changes in the plan.
+CONDITIONS = {
+    ("teacher", "as taught"): {},
+    ("teacher", "no variation"): {"variability": 0.0},
+    ("teacher", "twice as varied"): {"variability": 2.0},
+    ("workspace", "half each way"): {"workspace": 0.5},
+    ("positions", "spread out"): {"choice": "spread"},
+}
+SCHEMES = ("relearn", "transfer", "transfer_default")
+
+
+def rows_of(condition, results):
+    """The results of one condition, a row for each scheme and count."""
+    factor, value = condition
+    return [
+        {
+            "factor": factor,
+            "value": value,
+            "scheme": scheme,
+            "samples": int(count),
+            "success_rate": found["success_rate"],
+            "per_repeat": found["per_repeat"],
+        }
+        for scheme, by_count in results["schemes"].items()
+        for count, found in by_count.items()
+    ]
+
+
+def draw(path: Path, rows, plan) -> None:
+    """A panel for each condition: success over samples."""
+    figure, panels = plt.subplots(
+        1,
+        len(CONDITIONS),
+        figsize=(3.1 * len(CONDITIONS), 3.6),
+        sharey=True,
+        layout="constrained",
+    )
+    for axes, (factor, value) in zip(panels, CONDITIONS, strict=True):
+        for i, scheme in enumerate(SCHEMES):
+            points = [
+                row
+                for row in rows
+                if (row["factor"], row["value"], row["scheme"])
+                == (factor, value, scheme)
+            ]
+            rates = [row["success_rate"] for row in points]
+            # Side by side, so that all are seen where they are the same.
+            axes.errorbar(
+                [row["samples"] + 0.12 * (i - 1) for row in points],
+                [rate["mean"] for rate in rates],
+                yerr=[
+                    [rate["mean"] - rate["low"] for rate in rates],
+                    [rate["high"] - rate["mean"] for rate in rates],
+                ],
+                marker="o",
+                ms=4,
+                capsize=2,
+                label=scheme.replace("_", ", "),
+            )
+        axes.set(xlabel="samples", ylim=(0.0, 1.05))
+        axes.set_title(f"{factor}: {value}", fontsize=10)
+        axes.grid(alpha=0.3)
+    panels[0].set_ylabel("success")
+    panels[0].legend(fontsize=8, loc="lower right")
+    figure.suptitle(
+        f"{plan.evaluations} unseen positions, {plan.repeats} repeats; "
+        "bars: 95 %",
+        fontsize=10,
+    )
+    with atomic_path(path) as fresh:
+        figure.savefig(fresh, dpi=130)
+    plt.close(figure)
+
+
+def main() -> int:
+    """Runs the study and draws it."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "--samples", type=int, nargs="+", default=[3, 4, 5, 8, 12]
+    )
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--evaluations", type=int, default=6)
+    parser.add_argument("--demonstrations", type=int, default=25)
+    add_study_arguments(parser, "out/conditions")
+    args = parser.parse_args()
+    try:
+        base = MirrorPlan(
+            samples=tuple(sorted(args.samples)),
+            repeats=args.repeats,
+            evaluations=args.evaluations,
+            demonstrations=args.demonstrations,
+            schemes=SCHEMES,
+            seed=args.seed,
+            # Something to choose from, also for the most samples.
+            pool=max(6, *args.samples) + 2,
+        )
+        base.check()
+        check_study_arguments(args)
+        out = prepare_output(args.out)
+        rows = []
+        with campaign(args, Console()) as crew:
+            for condition, changes in CONDITIONS.items():
+                name = ": ".join(condition)
+                plan = dataclasses.replace(base, name=name, **changes)
+                rows += rows_of(condition, run_mirror(crew, plan).results)
+    except InputError as error:
+        print(f"when_transfer_wins: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    draw(out / "when_transfer_wins.png", rows, base)
+    write_json(
+        out / "results.json",
+        {
+            "study": "conditions",
+            "version": __version__,
+            "seed": args.seed,
+            "scenario": base.scenario,
+            "repeats": base.repeats,
+            "evaluations": base.evaluations,
+            "conditions": rows,
+        },
+    )
+    print(out / "when_transfer_wins.png")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
