@@ -638,7 +638,6 @@ def joint_costs(
     opening: ArrayLike,
     span: ArrayLike,
     weights: CostWeights,
-    until: float | None = None,
 ) -> JointCosts:
     """The cost of a run along `reference`.
 
@@ -648,16 +647,12 @@ def joint_costs(
         opening: (T', n) of the valves, in -1 to 1.
         span: (n,) range of each joint, rad.
         weights: of the cost's parts.
-        until: what comes later does not count, s.
     """
     q, v = np.asarray(q, dtype=float), np.asarray(opening, dtype=float)
     span = np.asarray(span, dtype=float)
     length = len(q)
-    if until is not None:
-        length = min(length, int(np.searchsorted(reference.t, until + 1e-9)))
     counted = reference.counted[:length]
     rest = reference.rest[:length]
-    q, v = q[:length], v[:length]
     dt = reference.t[1] - reference.t[0]
     error = (q - reference.q[:length])[counted]
     tracking = 100.0 * np.sqrt(np.mean(error**2, axis=0)) / span

@@ -887,6 +887,8 @@ def make_results(
         "version": __version__,
         "seed": plan.seed,
         "scenario": plan.scenario,
+        "start": plan.start,
+        "tuning": plan.tuning,
         "joints": list(plan.joints),
         "trials": {
             "finished": count[TrialState.COMPLETE] + count[TrialState.PRUNED],
@@ -915,7 +917,7 @@ def run_tune(
     out: Path,
     plan: TunePlan,
     *,
-    trials: int = 300,
+    trials: int = 216,
     workers: int = 2,
     restart: bool = False,
     page: bool = True,
@@ -980,7 +982,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--trials",
         type=int,
-        default=300,
+        default=216,
         metavar="N",
         help="how many trials the study shall have in the end",
     )
