@@ -170,6 +170,7 @@ def test_demo_alone_makes_a_page(demo):
         "toy",
     }
     assert "7 of 8" in made.text
+    assert "relearning from scratch: 100 %; 5 trials each" in made.text
     assert "12 demonstrations" in made.text
     assert len(made.all("audio")) == 2
     assert "5 trials for each scheme: one hit more or less makes 20 points" in (
@@ -247,6 +248,9 @@ def test_active_choice_that_does_not_help_is_said_so(tmp_path):
     results["active"] = None
     made = make(tmp_path, drum=results)
     assert "least certain" not in made.text
+    results["n_to_90"] = None
+    made = make(tmp_path, drum=results)
+    assert "Success did not come to stay at 90 %" in made.text
 
 
 # --- Who wins ----------------------------------------------------------------
@@ -297,7 +301,13 @@ def test_the_page_says_who_wins(tmp_path, winner, verdict, order, said):
         assert words.judge(contest(winner), n).text.replace(
             "\N{NO-BREAK SPACE}", " "
         ) in (made.text)
-    assert ("another scheme did better" in made.text) == (verdict == "other")
+    shortly = {
+        "transfer": "ahead of all other schemes",
+        "relearn": "relearning from scratch: 98 %, significantly better",
+        "unchanged": "the unchanged skill: 98 %, significantly better",
+        "level": "relearning from scratch: 95 %, no significant difference",
+    }
+    assert shortly[winner] in made.text
 
 
 def test_what_is_not_significant_is_not_called_clear():

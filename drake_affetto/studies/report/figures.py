@@ -130,6 +130,18 @@ def _marker(name: str) -> dict[str, Any]:
     }
 
 
+def _whiskers(rates: Sequence[Rate]) -> dict[str, Any]:
+    """Confidence intervals of rates, for points in percent."""
+    return {
+        "type": "data",
+        "symmetric": False,
+        "array": [100 * (r.high - r.mean) for r in rates],
+        "arrayminus": [100 * (r.mean - r.low) for r in rates],
+        "thickness": 1.2,
+        "width": 3,
+    }
+
+
 def _figure(
     traces: Iterable[Any] = (),
     *,
@@ -675,15 +687,7 @@ def success_by_scheme(contest: Contest) -> Chart:
         place = [i + shift for i in range(len(found))] if several else [k]
         mean = [100 * r.mean for r in found]
         along, across = ("x", "y") if several else ("y", "x")
-        error = {
-            "type": "data",
-            "symmetric": False,
-            "array": [100 * (r.high - r.mean) for r in found],
-            "arrayminus": [100 * (r.mean - r.low) for r in found],
-            "color": LIGHT["ink"],
-            "thickness": 1.4,
-            "width": 4,
-        }
+        error = _whiskers(found) | {"color": LIGHT["ink"], "thickness": 1.4}
         # The bar is pale, so that the whisker is seen on it in any theme.
         traces.append(
             go.Bar(
@@ -1098,14 +1102,7 @@ def scenario_dots(contests: dict[str, Contest]) -> Chart:
             go.Scatter(
                 x=[100 * r.mean for _, _, r in here],
                 y=[i + shift for i, _, _ in here],
-                error_x={
-                    "type": "data",
-                    "symmetric": False,
-                    "array": [100 * (r.high - r.mean) for _, _, r in here],
-                    "arrayminus": [100 * (r.mean - r.low) for _, _, r in here],
-                    "thickness": 1.2,
-                    "width": 0,
-                },
+                error_x=_whiskers([r for _, _, r in here]) | {"width": 0},
                 name=text(words.scheme(name)),
                 mode="markers",
                 marker=_marker(name),
@@ -1243,24 +1240,12 @@ def _condition_chart(
     traces = []
     for name in names:
         own = [(text(x), row) for x, row in points if row["scheme"] == name]
-        mean, low, high = (
-            [100 * row["success_rate"][kind] for _, row in own]
-            for kind in ("mean", "low", "high")
-        )
+        found = [Rate.of(row["success_rate"]) for _, row in own]
         traces.append(
             go.Scatter(
                 x=[ticks.index(x) for x, _ in own],
-                y=mean,
-                error_y={
-                    "type": "data",
-                    "symmetric": False,
-                    "array": [h - m for h, m in zip(high, mean, strict=True)],
-                    "arrayminus": [
-                        m - v for v, m in zip(low, mean, strict=True)
-                    ],
-                    "thickness": 1,
-                    "width": 3,
-                },
+                y=[100 * r.mean for r in found],
+                error_y=_whiskers(found),
                 name=text(words.scheme(name)),
                 mode="lines+markers",
                 line={"color": scheme_color(name), "width": 2},

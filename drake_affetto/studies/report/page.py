@@ -510,14 +510,7 @@ def _short(material: Material) -> Section:
                 (
                     words.percent(contest.rates[best][n].mean),
                     f"{words.in_text(best)}, {n} new demonstrations",
-                    f"of {words.number(contest.trials, 'trial')} each: too few "
-                    "to compare"
-                    if not contest.tested
-                    else {
-                        "transfer": "ahead of all other schemes",
-                        "equal": "others not significantly behind or ahead",
-                        "other": "another scheme did better, see below",
-                    }[verdict.winner],
+                    _standing(contest, verdict),
                 )
             )
         if "unchanged" in contest.rates:
@@ -555,6 +548,27 @@ def _short(material: Material) -> Section:
     columns = {1: 1, 2: 2, 4: 4, 5: 5, 7: 4, 8: 4}.get(len(tiles), 3)
     body = f'<ul class="tiles" style="--columns:{columns}">{items}</ul>'
     return Section("short", "In short", "In short", body)
+
+
+def _standing(contest: Contest, verdict: words.Verdict) -> str:
+    """How the better of the transfers stands to the others, shortly."""
+    rates = {name: row[verdict.samples] for name, row in contest.rates.items()}
+    rivals = [
+        name
+        for name in (*verdict.leaders, *verdict.level)
+        if name not in words.TRANSFERS
+    ]
+    if not rivals:
+        return "ahead of all other schemes" + (
+            "" if contest.tested else f", {contest.trials} trials each"
+        )
+    rival = max(rivals, key=lambda name: rates[name].mean)
+    told = f"{words.in_text(rival)}: {words.percent(rates[rival].mean)}"
+    if not contest.tested:
+        return f"{told}; {contest.trials} trials each"
+    if verdict.winner == "equal":
+        return f"{told}, no significant difference"
+    return f"{told}, significantly better"
 
 
 def _few_tiles(material: Material) -> list[tuple[str, str, str]]:
@@ -839,6 +853,8 @@ def _drum_words(drumming: Drumming, results: dict[str, Any] | None) -> str:
                 f"certain did not help: 90 % after {chosen}, in random order "
                 f"after {random}"
             )
+    elif results and results["n_to_90"] is None:
+        parts.append("success did not come to stay at 90 % or more")
     if results:
         separation = results["separation"]
         auc = separation["auc"]
