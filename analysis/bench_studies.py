@@ -1,0 +1,68 @@
+"""Speed of a study: two workers beside one, and beside real time."""
+
+from pathlib import Path
+import resource
+import tempfile
+import time
+
+import numpy as np
+
+from drake_affetto.scenario import load_scenario
+from drake_affetto.studies.pool import Crew
+from drake_affetto.studies.store import TrialStore
+from drake_affetto.studies.tasks import (
+    demonstration,
+    draw_positions,
+    run_task,
+    strike,
+)
+
+_TRIALS = 40
+
+
+def _strikes(theta, prototypes, first: int, count: int):
+    scenario = load_scenario("drumming")
+    places = draw_positions(scenario, count, np.random.default_rng(first))
+    return [
+        strike("drumming", xy, first + i, theta, prototypes)
+        for i, xy in enumerate(places)
+    ]
+
+
+def measure(workers: int, folder: Path) -> float:
+    """Trials a second with so many workers, once they have started."""
+    with (
+        TrialStore(folder / f"{workers}.sqlite") as store,
+        Crew(run_task, store, workers=workers, quiet=True) as crew,
+    ):
+        ((_, arrays),) = crew.run(
+            "lesson", [demonstration("drumming", [0.26, -0.1], 0)]
+        )
+        theta, prototypes = arrays["theta"], arrays["prototype"][None]
+        # Every worker has built its station after these.
+        crew.run("warm", _strikes(theta, prototypes, 1000, 4 * workers))
+        begin = time.perf_counter()
+        crew.run("strikes", _strikes(theta, prototypes, 0, _TRIALS))
+        return _TRIALS / (time.perf_counter() - begin)
+
+
+def run() -> None:
+    """Prints trials a second with one and two workers, and their memory."""
+    with tempfile.TemporaryDirectory() as folder:
+        one, two = (measure(workers, Path(folder)) for workers in (1, 2))
+    scenario = load_scenario("drumming")
+    seconds = scenario.policy.delay + scenario.dmp.duration + 0.3
+    print(
+        f"one worker          {one:6.2f} trials/s"
+        f"  ({one * seconds:.1f} × real time)"
+    )
+    print(
+        f"two workers         {two:6.2f} trials/s"
+        f"  ({two / one:.2f} × one; at least 1.7 × is wanted)"
+    )
+    peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024**2
+    print(f"a worker's memory   {peak:6.2f} GiB at most")
+
+
+if __name__ == "__main__":
+    run()
