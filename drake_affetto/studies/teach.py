@@ -249,20 +249,33 @@ def teach(
     Returns:
         What came of each place.
     """
+    if console is not None and course.taught:
+        console.print(f"{len(course.taught)} are in {course.path} already")
+    outcomes = (
+        _teach_missing(course, workers, console) if course.missing else {}
+    )
+    return [
+        outcomes[i] if i in outcomes else course.outcome(i)
+        for i in range(len(course.positions))
+    ]
+
+
+def _teach_missing(
+    course: Course, workers: int, console: Any
+) -> dict[int, Taught]:
     from concurrent.futures import ThreadPoolExecutor
     import contextlib
 
     from drake_affetto.studies.pool import Crew
     from drake_affetto.studies.tasks import demonstration, run_task
 
-    missing = course.missing
     specs = {
         i: demonstration(
             course.scenario_name,
             course.positions[i].tolist(),
             course.seed(i),
         )
-        for i in missing
+        for i in course.missing
     }
     path = course.path.with_name(f"{course.path.name}.trials.sqlite")
     outcomes: dict[int, Taught] = {}
@@ -306,16 +319,11 @@ def teach(
                 quiet=console is None,
             )
         )
-        if console is not None and course.taught:
-            console.print(f"{len(course.taught)} are in {course.path} already")
         crew.run("Teaching by hand", list(specs.values()))
     if not course.missing:
         for old in (path, *(Path(f"{path}{s}") for s in ("-wal", "-shm"))):
             old.unlink(missing_ok=True)
-    return [
-        outcomes[i] if i in outcomes else course.outcome(i)
-        for i in range(len(course.positions))
-    ]
+    return outcomes
 
 
 class _WatchedStore(TrialStore):
