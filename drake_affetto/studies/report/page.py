@@ -1371,6 +1371,8 @@ def _origin(material: Material) -> Section:
             for key in ("repeats", "evaluations", "seeds")
             if isinstance(results.get(key), int)
         ]
+        if name == "scenarios":
+            size.append(words.number(len(results[name]), "view"))
         rows.append(
             [
                 name,
