@@ -6,13 +6,15 @@ determine a trial wholly), and any `concurrent.futures.Executor` may run it.
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import (
+    FIRST_COMPLETED,
     BrokenExecutor,
     Executor,
     Future,
     ProcessPoolExecutor,
-    as_completed,
+    wait,
 )
 import contextlib
+import itertools
 import multiprocessing
 import os
 import signal
@@ -42,6 +44,9 @@ Result = tuple[dict[str, Any], Arrays]
 
 # How often a trial whose worker died is tried again.
 _RETRIES = 2
+
+# How many trials are handed to an executor whose size is not known.
+_CLUSTER_AHEAD = 1000
 
 
 class InProcessExecutor(Executor):
@@ -124,6 +129,8 @@ class Crew:
         self._store = store
         self._workers = workers
         self._own = executor is None
+        # How many trials are handed over at a time.
+        self._ahead = max(1, 8 * workers) if self._own else _CLUSTER_AHEAD
         self._executor = executor or make_executor(workers)
         self._progress = Progress(
             TextColumn("{task.description:<32}"),
@@ -199,19 +206,26 @@ class Crew:
         results: dict[str, Result | None],
         bar: TaskID,
     ) -> None:
-        futures = {}
-        for key in todo:
-            futures[self._executor.submit(self._run, plan[key])] = key
-        self._crew_of_this_run = self._processes()
+        waiting = iter(todo)
+        futures: dict[Future, str] = {}
         try:
-            for future in as_completed(futures):
-                key = futures.pop(future)
-                result, arrays = future.result()
-                self._store.put(plan[key], result, arrays)
-                # As the store would give it back: a resumed study and one
-                # that was not disturbed see the same numbers.
-                results[key] = self._store.get(plan[key])
-                self._progress.advance(bar)
+            while True:
+                # Not all at once: in this process, submitting is running.
+                for key in itertools.islice(
+                    waiting, self._ahead - len(futures)
+                ):
+                    futures[self._executor.submit(self._run, plan[key])] = key
+                self._crew_of_this_run = self._processes()
+                if not futures:
+                    return
+                for future in wait(futures, return_when=FIRST_COMPLETED).done:
+                    key = futures.pop(future)
+                    result, arrays = future.result()
+                    self._store.put(plan[key], result, arrays)
+                    # As the store would give it back: a resumed study and one
+                    # that was not disturbed see the same numbers.
+                    results[key] = self._store.get(plan[key])
+                    self._progress.advance(bar)
         except BaseException:
             for future in futures:
                 future.cancel()

@@ -91,3 +91,17 @@ def test_an_error_in_a_trial_reaches_the_user(tmp_path, workers):
         pytest.raises(InputError, match="not on the table"),
     ):
         crew.run("squares", specs(tmp_path, 1))
+
+
+def test_each_trial_is_kept_as_it_finishes(tmp_path):
+    """Also where the workers are this very process."""
+    kept = []
+    with TrialStore(tmp_path / "s.sqlite") as store:
+
+        def run(spec):
+            kept.append(len(store))
+            return square(spec)
+
+        with Crew(run, store, workers=0, quiet=True) as crew:
+            crew.run("squares", specs(tmp_path))
+    assert kept == [0, 1, 2, 3, 4]
