@@ -263,9 +263,6 @@ def teach(
 def _teach_missing(
     course: Course, workers: int, console: Any
 ) -> dict[int, Taught]:
-    from concurrent.futures import ThreadPoolExecutor
-    import contextlib
-
     from drake_affetto.studies.pool import Crew
     from drake_affetto.studies.tasks import demonstration, run_task
 
@@ -279,9 +276,7 @@ def _teach_missing(
     }
     path = course.path.with_name(f"{course.path.name}.trials.sqlite")
     outcomes: dict[int, Taught] = {}
-    with contextlib.ExitStack() as stack:
-        store = _WatchedStore(path)
-        stack.enter_context(store)
+    with _WatchedStore(path) as store:
 
         def keep_finished() -> None:
             """Adds to the file what no earlier position holds back."""
@@ -305,21 +300,10 @@ def _teach_missing(
 
         keep_finished()
         store.after_put = keep_finished
-        # One thread where there are no workers: trials then are kept one by
-        # one, as from workers.
-        here = (
-            stack.enter_context(ThreadPoolExecutor(1)) if workers == 0 else None
-        )
-        crew = stack.enter_context(
-            Crew(
-                run_task,
-                store,
-                workers=workers,
-                executor=here,
-                quiet=console is None,
-            )
-        )
-        crew.run("Teaching by hand", list(specs.values()))
+        with Crew(
+            run_task, store, workers=workers, quiet=console is None
+        ) as crew:
+            crew.run("Teaching by hand", list(specs.values()))
     if not course.missing:
         for old in (path, *(Path(f"{path}{s}") for s in ("-wal", "-shm"))):
             old.unlink(missing_ok=True)
@@ -330,6 +314,9 @@ class _WatchedStore(TrialStore):
     """A store that says when a trial has been put into it."""
 
     after_put: Callable[[], None] | None = None
+
+    def __enter__(self) -> "_WatchedStore":
+        return self
 
     def put(self, *trial: Any) -> None:
         super().put(*trial)
