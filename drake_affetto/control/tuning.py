@@ -181,6 +181,7 @@ class TuningConfig:
             a joint is taken at most, of its range.
         excursions: lowest and highest angle of joints by name, rad.
         settling: first of a trial, until errors count, s.
+        approach: from the start posture to where sines begin, s.
         tail: rest at the end of each reference, s.
         rest_delay: after the reference stops a joint is given this long to
             come to rest, s.
@@ -196,6 +197,7 @@ class TuningConfig:
     reach: float = 0.2
     excursions: dict[str, list[float]] = dataclasses.field(default_factory=dict)
     settling: float = 0.5
+    approach: float = 1.0
     tail: float = 1.0
     rest_delay: float = 0.5
     sines: SinesConfig = dataclasses.field(default_factory=SinesConfig)
@@ -216,6 +218,7 @@ class TuningConfig:
             ("margin", 0.0, 0.4),
             ("reach", 0.01, 1.0),
             ("settling", 0.1, 10.0),
+            ("approach", 0.1, 10.0),
             ("tail", 0.0, 10.0),
             ("rest_delay", 0.0, 10.0),
             ("sines.duration", 0.5, 60.0),
@@ -447,7 +450,7 @@ def _sines_and_steps(config: TuningConfig, space: Excursion) -> Reference:
     parts = [
         space.start[None],
         _hold(config, space.start, config.settling),
-        _move(config, space.start, middle, 1.0),
+        _move(config, space.start, middle, config.approach),
     ]
     t = _samples(config, sines.duration)
     slow = np.linspace(sines.low, sines.high, n)
@@ -484,9 +487,9 @@ def _chirp(config: TuningConfig, space: Excursion) -> Reference:
     parts = [
         space.start[None],
         _hold(config, space.start, config.settling),
-        _move(config, space.start, middle, 1.0),
+        _move(config, space.start, middle, config.approach),
         space.angle(wave),
-        _move(config, middle, space.start, 1.0),
+        _move(config, middle, space.start, config.approach),
         _hold(config, space.start, config.tail),
     ]
     return _finish("chirp", config, np.concatenate(parts))

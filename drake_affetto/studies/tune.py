@@ -7,7 +7,7 @@ goes on from there.
 
 import argparse
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 import contextlib
 import dataclasses
@@ -631,11 +631,40 @@ def _prepare_study(
     return study, sampler.search
 
 
+class _Workers:
+    """An executor that can be replaced when its processes have died."""
+
+    def __init__(self, count: int):
+        """Makes the executor: `count` processes, or this one for 0."""
+        from drake_affetto.studies.pool import make_executor
+
+        self._make = make_executor
+        self.count = count
+        self.executor = make_executor(count)
+
+    def renew(self) -> None:
+        """Starts new processes."""
+        self.executor.shutdown(wait=True)
+        self.executor = self._make(self.count)
+
+    def __enter__(self) -> "_Workers":
+        return self
+
+    def __exit__(self, kind: type | None, *_: object) -> None:
+        if kind is not None:
+            # Trials on their way are lost; the next start tries them again.
+            processes = getattr(self.executor, "_processes", None) or {}
+            for process in list(processes.values()):
+                with contextlib.suppress(OSError, ValueError):
+                    process.terminate()
+        self.executor.shutdown(wait=kind is None, cancel_futures=True)
+
+
 def _run_trials(
     out: Path,
     plan: TunePlan,
     trials: int,
-    workers: int,
+    workers: _Workers,
     restart: bool,
     console: Any,
 ) -> optuna.Study:
@@ -648,8 +677,6 @@ def _run_trials(
         TimeElapsedColumn,
         TimeRemainingColumn,
     )
-
-    from drake_affetto.studies.pool import make_executor
 
     study, search = _prepare_study(out, plan, restart)
     finished = set(finished_trials(study))
@@ -668,40 +695,28 @@ def _run_trials(
     bar = progress.add_task("", total=trials, note=_note(study))
     progress.update(bar, completed=len(finished))
     deaths = 0
-    executor = make_executor(workers)
-    try:
-        with progress:
-            while any(c not in finished for c in range(trials)):
-                try:
-                    for candidate in _outcomes(
-                        executor, out, plan, search, finished, trials, workers
-                    ):
-                        finished.add(candidate)
-                        progress.update(
-                            bar, completed=len(finished), note=_note(study)
-                        )
-                except BrokenProcessPool as error:
-                    deaths += 1
-                    if deaths > _RETRIES:
-                        raise InputError(
-                            "worker processes die again and again (memory may "
-                            f"be short); {len(finished)} finished trials are "
-                            f"kept in {out}"
-                        ) from error
-                    progress.console.print("A worker died; going on")
-                    executor.shutdown(wait=True)
-                    study, search = _prepare_study(out, plan, False)
-                    finished = set(finished_trials(study))
-                    executor = make_executor(workers)
-    except BaseException:
-        # Trials on their way are lost; the next start tries them again.
-        processes = getattr(executor, "_processes", None) or {}
-        for process in list(processes.values()):
-            with contextlib.suppress(OSError, ValueError):
-                process.terminate()
-        executor.shutdown(wait=False, cancel_futures=True)
-        raise
-    executor.shutdown(wait=True)
+    with progress:
+        while any(c not in finished for c in range(trials)):
+            try:
+                for candidate in _outcomes(
+                    workers, out, plan, search, finished, trials
+                ):
+                    finished.add(candidate)
+                    progress.update(
+                        bar, completed=len(finished), note=_note(study)
+                    )
+            except BrokenProcessPool as error:
+                deaths += 1
+                if deaths > _RETRIES:
+                    raise InputError(
+                        "worker processes die again and again (memory may "
+                        f"be short); {len(finished)} finished trials are "
+                        f"kept in {out}"
+                    ) from error
+                progress.console.print("A worker died; going on")
+                workers.renew()
+                study, search = _prepare_study(out, plan, False)
+                finished = set(finished_trials(study))
     return study
 
 
@@ -714,13 +729,12 @@ def _note(study: optuna.Study) -> str:
 
 
 def _outcomes(
-    executor,
+    workers: _Workers,
     out: Path,
     plan: TunePlan,
     search: JointwiseCmaEs,
     finished: Collection[int],
     trials: int,
-    workers: int,
 ) -> Iterator[int]:
     """Runs the candidates that are not finished, generation by generation.
 
@@ -732,9 +746,11 @@ def _outcomes(
         todo = [c for c in range(first, end) if c not in finished]
         running: set[Future] = set()
         while todo or running:
-            while todo and len(running) < max(1, workers):
+            while todo and len(running) < max(1, workers.count):
                 running.add(
-                    executor.submit(run_trial, str(out), plan, todo.pop(0))
+                    workers.executor.submit(
+                        run_trial, str(out), plan, todo.pop(0)
+                    )
                 )
             done, running = wait(running, return_when=FIRST_COMPLETED)
             for future in done:
@@ -762,26 +778,23 @@ def run_reference(plan: TunePlan, name: str, gains: Array) -> Run:
     return robot.run(robot.reference(name), PidfGains.from_array(gains))
 
 
-def assess(plan: TunePlan, best: PidfGains, workers: int) -> Assessment:
+def assess(plan: TunePlan, best: PidfGains, executor: Executor) -> Assessment:
     """Runs start and best gains along all references."""
-    from drake_affetto.studies.pool import make_executor
-
     robot = bench(plan)
     start = load_control(plan.start).for_joints(robot.names)
     names = (TEST, *HELD_OUT, REST)
     references = {name: robot.reference(name) for name in names}
-    with make_executor(workers) as executor:
-        jobs = {
-            name: [
-                executor.submit(run_reference, plan, name, gains.to_array())
-                for gains in (start, best)
-            ]
-            for name in names
-        }
-        runs = {
-            name: (pair[0].result(), pair[1].result())
-            for name, pair in jobs.items()
-        }
+    jobs = {
+        name: [
+            executor.submit(run_reference, plan, name, gains.to_array())
+            for gains in (start, best)
+        ]
+        for name in names
+    }
+    runs = {
+        name: (pair[0].result(), pair[1].result())
+        for name, pair in jobs.items()
+    }
     costs = {
         name: (
             robot.costs(references[name], pair[0]),
@@ -939,15 +952,15 @@ def run_tune(
     Raises:
         InputError: if the folder holds another study.
     """
-    with _alone(out):
-        study = _run_trials(out, plan, trials, workers, restart, console)
+    with _alone(out), _Workers(workers) as crew:
+        study = _run_trials(out, plan, trials, crew, restart, console)
         if console is not None:
             console.print("Following the held-out trajectories ...")
         robot = bench(plan)
         start = load_control(plan.start).for_joints(robot.names)
         best = study.best_trial
         gains = _rounded(scaled_gains(start, robot.names, best.params))
-        assessment = assess(plan, gains, workers)
+        assessment = assess(plan, gains, crew.executor)
         results = make_results(plan, study, best, gains, assessment)
         heading = (
             f"Gains from `affetto tune`: trial {best.number} of "

@@ -369,6 +369,7 @@ def _importance(joints: Sequence[str], share: np.ndarray) -> go.Figure:
         title_text="share of the joint's cost", tickformat=".0%", range=[0, 1]
     )
     figure.update_yaxes(automargin=True)
+    figure.update_layout(legend_traceorder="normal")
     return _layout(figure, 110 + 32 * len(joints), barmode="stack")
 
 

@@ -100,7 +100,7 @@ def test_sines_of_no_two_joints_share_a_frequency():
     q = make_reference(TEST, config, space_of(n)).q
     # The sines alone, between settling, the way there, and the steps.
     rate = config.sample_rate
-    first = round((config.settling + 1.0) * rate)
+    first = round((config.settling + config.approach) * rate)
     wave = q[first : first + round(config.sines.duration * rate)]
     wave = (wave - wave.mean(axis=0)) * np.hanning(len(wave))[:, None]
     spectrum = np.abs(np.fft.rfft(wave, 8 * len(wave), axis=0))
