@@ -1,6 +1,7 @@
 """Physics of valves, chambers and friction, against closed forms."""
 
 import math
+from xml.etree import ElementTree
 
 from actuator_bench import (
     ATMOSPHERE,
@@ -33,6 +34,7 @@ from drake_affetto.pneumatics.parameters import (
     closed_stiffness,
     load_parameters,
 )
+from drake_affetto.resources import models_dir
 
 T0 = REFERENCE_TEMPERATURE
 
@@ -417,13 +419,19 @@ def regulated_step(actuator, start, dead_time, side):
         if joint.actuator == actuator
     )
     array = parameters.for_joints([name], [0.0], [1.5])
+    return step_at_lower_stop(array, 0.0, start, dead_time)[:, side, 0]
+
+
+def step_at_lower_stop(array, q, start, dead_time):
+    """Pressures [kPa gauge] of joints at q, (501, 2, n); command 400 kPa."""
+    array = array.copy()
     array[Row.DEAD_TIME] = dead_time
+    n = array.shape[1]
     actuators = Actuators(array, ATMOSPHERE + 1e3 * start, mode=REGULATOR_MODE)
-    pressure = [actuators.pressure[side]]
+    pressure = [np.array(actuators.pressure)]
     for _ in range(500):
-        p = actuators.step(ATMOSPHERE + 400e3, 0.0)
-        pressure.append(p[side])
-    return 1e-3 * (np.array(pressure) - ATMOSPHERE)
+        pressure.append(np.array(actuators.step(ATMOSPHERE + 400e3, q)))
+    return 1e-3 * (np.reshape(pressure, (-1, 2, n)) - ATMOSPHERE)
 
 
 @pytest.mark.parametrize("actuator", ["waist", "shoulder", "rotation", "wrist"])
@@ -436,6 +444,38 @@ def test_regulated_steps_are_the_robots(actuator):
         )
         for time, measured in table.items():
             assert mean[time] == pytest.approx(measured, abs=15.0)
+
+
+def test_the_mean_of_the_robots_joints_steps_as_the_table():
+    """The joints with their own ranges, at their lower stops as in the logs."""
+    joints = robot_joints()
+    names = [name for name in joints if not name.startswith("right_")]
+    lower, upper = np.array([joints[name] for name in names]).T
+    array = load_parameters().for_joints(names, lower, upper)
+    delays = 0.092 + 0.023 * np.array([-1.35, -0.67, 0.0, 0.67, 1.35])
+    for table, start, side in ((FILL, 2.0, 0), (EMPTY, 560.0, 1)):
+        mean = np.mean(
+            [step_at_lower_stop(array, lower, start, d) for d in delays],
+            axis=0,
+        )
+        for time, measured in table.items():
+            assert mean[time, side].mean() == pytest.approx(measured, abs=12.0)
+            # The elbow, to whose logs the parameters were fitted.
+            elbow = mean[time, side, names.index("left_elbow_flexion")]
+            assert elbow == pytest.approx(measured, abs=15.0)
+
+
+def robot_joints():
+    """Limits [rad] of the robot's joints by name."""
+    tree = ElementTree.parse(models_dir() / "sdf" / "affetto.sdf")
+    return {
+        joint.get("name"): [
+            float(joint.findtext(f"axis/limit/{side}"))
+            for side in ("lower", "upper")
+        ]
+        for joint in tree.iter("joint")
+        if joint.get("type") == "revolute"
+    }
 
 
 def test_a_single_regulated_step_is_the_robots_but_for_its_dead_time():
