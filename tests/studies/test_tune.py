@@ -19,7 +19,7 @@ import yaml
 
 from drake_affetto.cli import main
 from drake_affetto.control.pidf import load_control
-from drake_affetto.control.tuning import HELD_OUT, TEST
+from drake_affetto.control.tuning import HELD_OUT, REST, TEST, rest_std
 from drake_affetto.scenario import load_scenario
 from drake_affetto.studies.tune import (
     GAINS,
@@ -349,6 +349,29 @@ def test_both_arms_get_the_same_gains():
         data["gains"]["left_elbow_flexion"]
         == data["gains"]["right_elbow_flexion"]
     )
+
+
+@pytest.mark.slow
+def test_the_default_gains_beat_the_hand_tuned_ones_and_rest():
+    plan = load_plan(None)
+    robot = bench(plan)
+    reference = robot.reference(TEST)
+    tuned, start = (
+        control.for_joints(robot.names)
+        for control in (load_control(), load_control(START_FILE))
+    )
+    after, before = (
+        robot.costs(reference, robot.run(reference, gains))
+        for gains in (tuned, start)
+    )
+    assert after.mean() < 0.7 * before.mean()
+    assert np.all(after.tracking < before.tracking)
+    assert after.tracking.mean() < 0.7 * before.tracking.mean()
+    # No limit cycle in any of several postures.
+    rest = robot.reference(REST)
+    q = robot.run(rest, tuned).q
+    swing = rest_std(q, rest.rest, robot.tuning.sample_rate) / robot.span
+    assert np.all(swing < 0.005)
 
 
 def test_the_tuned_gains_are_the_default():
