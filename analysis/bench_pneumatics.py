@@ -30,8 +30,8 @@ from drake_affetto.scene.world import (
 )
 
 _STEP = 0.001
-_SLICE = 0.25
-_TRIES = 9
+_SLICE = 0.05
+_TRIES = 100
 
 
 class NumpyActuation(LeafSystem):

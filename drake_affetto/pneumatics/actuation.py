@@ -24,7 +24,7 @@ from drake_affetto.pneumatics.chamber import (
     Row,
     line_slots,
     memory_size,
-    step_joints,
+    step_joints_flat,
 )
 from drake_affetto.pneumatics.parameters import (
     DEFAULT_FILE,
@@ -340,19 +340,18 @@ class PneumaticActuation(LeafSystem):
         return p_a, p_b
 
     def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
-        step_joints(
+        mutable = discrete_state.get_mutable_value
+        step_joints_flat(
             self._time_step,
             self._mode,
             self._look_ahead,
-            context.get_numeric_parameter(self._parameter_index)
-            .value()
-            .reshape(self._shape),
+            context.get_numeric_parameter(self._parameter_index).value(),
             self._command_port.Eval(context),
             self._state_port.Eval(context),
-            discrete_state.get_mutable_value(self._pressure_index),
-            discrete_state.get_mutable_value(self._torque_index),
-            discrete_state.get_mutable_value(self._flow_index),
-            discrete_state.get_mutable_value(self._memory_index),
+            mutable(self._pressure_index),
+            mutable(self._torque_index),
+            mutable(self._flow_index),
+            mutable(self._memory_index),
         )
 
 

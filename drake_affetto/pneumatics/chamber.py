@@ -563,3 +563,34 @@ def step_joints(
         )
         angle[i] = q_next
         speed[i] = v
+
+
+@numba.njit(cache=True)
+def step_joints_flat(
+    h: float,
+    mode: int,
+    look_ahead: float,
+    parameters: NDArray[np.float64],
+    command: NDArray[np.float64],
+    joint_state: NDArray[np.float64],
+    pressure: NDArray[np.float64],
+    torque: NDArray[np.float64],
+    mass_flow: NDArray[np.float64],
+    memory: NDArray[np.float64],
+) -> None:
+    """`step_joints` with its parameters as one row, (ROWS · n).
+
+    A thousand times a second even the reshaping of an array in Python counts.
+    """
+    step_joints(
+        h,
+        mode,
+        look_ahead,
+        parameters.reshape(ROWS, parameters.size // ROWS),
+        command,
+        joint_state,
+        pressure,
+        torque,
+        mass_flow,
+        memory,
+    )
