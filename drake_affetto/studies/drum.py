@@ -55,6 +55,8 @@ class DrumPlan:
         evaluations: unseen positions, the same throughout the study.
         repeats: how often all of it is done, with other demonstrations.
         active: whether the skill's own choice of order is tried too.
+        after: after which demonstrations the skill is tried; after each where
+            it is empty. After the last it always is.
         scenario: by name or path.
         seed: of everything that is random.
     """
@@ -63,6 +65,7 @@ class DrumPlan:
     evaluations: int = 10
     repeats: int = 1
     active: bool = False
+    after: tuple[int, ...] = ()
     scenario: str = "drumming"
     seed: int = 0
 
@@ -71,6 +74,14 @@ class DrumPlan:
         require_range("--demonstrations", self.demonstrations, 3, 1000)
         require_range("--evaluations", self.evaluations, 1, 1000)
         require_range("--repeats", self.repeats, 1, 1000)
+        for number in self.after:
+            require_range("--after", number, 1, self.demonstrations)
+
+    @property
+    def tried_after(self) -> list[int]:
+        """After which demonstrations the skill is tried, in order."""
+        every = range(1, self.demonstrations + 1)
+        return sorted({*(self.after or every), self.demonstrations})
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -98,6 +109,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="how often, each time with other demonstrations",
     )
     parser.add_argument(
+        "--after",
+        type=int,
+        nargs="+",
+        default=[],
+        metavar="N",
+        help="try the skill only after so many demonstrations",
+    )
+    parser.add_argument(
         "--active",
         action="store_true",
         help="also let the skill choose which demonstration comes next",
@@ -115,6 +134,7 @@ def run(args: argparse.Namespace) -> int:
         evaluations=args.evaluations,
         repeats=args.repeats,
         active=args.active,
+        after=tuple(args.after),
         scenario=args.scenario,
         seed=args.seed,
     )
@@ -220,10 +240,11 @@ def run_drum(crew: Crew, plan: DrumPlan) -> dict[str, Any]:
                 [lessons[i] for i in sequence],
                 trial_seed(plan.seed, HIDDEN, repeat),
             )
-            if order == "active":
-                # At the end both know the same.
-                course = course[:-1]
-            for n, skill in enumerate(course, start=1):
+            for n in plan.tried_after:
+                if order == "active" and n == plan.demonstrations:
+                    # At the end both orders know the same.
+                    continue
+                skill = course[n - 1]
                 for place, view in enumerate(views[repeat]):
                     row = {
                         "order": order,

@@ -1,5 +1,6 @@
 """The drumming study: its plan in a fake world, and a small real one."""
 
+import dataclasses
 import json
 import os
 from pathlib import Path
@@ -122,6 +123,18 @@ def test_more_repeats_leave_the_first_as_they_were(tmp_path, results):
         assert crew.reused >= finished - 2
 
 
+def test_a_curve_of_some_points_is_part_of_the_whole(tmp_path, results):
+    plan = dataclasses.replace(PLAN, after=(2, 5))
+    few = in_fake_world(tmp_path / "trials.sqlite", plan)
+    for part, whole in (
+        (few, results),
+        (few["active"], results["active"]),
+    ):
+        points = whole["by_demonstrations"]
+        assert part["by_demonstrations"] == [points[i] for i in (1, 4, 7)]
+    assert few["final"] == results["final"]
+
+
 def test_active_order_asks_where_it_is_least_certain():
     config = load_scenario("drumming").skill
     rng = np.random.default_rng(0)
@@ -224,6 +237,7 @@ def test_a_small_study_on_the_robot(tmp_path):
         (["--demonstrations", "2"], "--demonstrations"),
         (["--evaluations", "0"], "--evaluations"),
         (["--repeats", "0"], "--repeats"),
+        (["--after", "3", "26"], "--after"),
         (["--workers", "-1"], "--workers"),
         (["--scenario", "drummin"], "did you mean 'drumming'"),
         (["--reuse", "nowhere"], "no trials.sqlite in nowhere"),
