@@ -5,17 +5,18 @@ rest determines the trial, including seeds. Results are plain numbers, arrays
 go beside them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 import dataclasses
 import functools
 import hashlib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from drake_affetto import __version__
 from drake_affetto.errors import InputError
-from drake_affetto.resources import models_dir
+from drake_affetto.resources import models_dir, resolve
 from drake_affetto.scenario import Scenario, load_scenario
 from drake_affetto.skill.policy import Regressor
 from drake_affetto.sound.reward import reward_over_time
@@ -37,15 +38,29 @@ def set_runner(scenario: str, trial_runner: TrialRunner) -> None:
     _RUNNERS[scenario] = trial_runner
 
 
+# What of a scenario says how a skill is learned, which no trial depends on: it
+# is given the outcome.
+_LEARNING = ("skill", "transfer")
+
+
 @functools.cache
 def models_digest() -> str:
-    """Tells this installation's models from any others."""
-    digest = hashlib.sha256()
+    """Tells the bodies and scenes of this installation from any others."""
     root = models_dir()
-    for path in sorted(root.rglob("*")):
-        if path.is_file() and path.suffix in (".sdf", ".yaml", ".xml", ".obj"):
-            digest.update(path.relative_to(root).as_posix().encode())
-            digest.update(path.read_bytes())
+    # The other YAML files count where a scenario names them.
+    suffixes = (".sdf", ".obj", ".xml", ".dmd.yaml")
+    return _digest_of_files(
+        path
+        for path in sorted(root.rglob("*"))
+        if path.is_file() and path.name.endswith(suffixes)
+    )
+
+
+def _digest_of_files(paths: Iterable[Path]) -> str:
+    digest = hashlib.sha256()
+    for path in paths:
+        digest.update(path.name.encode())
+        digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 
@@ -53,12 +68,31 @@ def models_digest() -> str:
 def _fingerprint(scenario: str) -> dict[str, str]:
     """What, besides its own numbers, determines a trial of a scenario."""
     loaded = _plain(load_scenario(scenario))
+    for name in _LEARNING:
+        del loaded[name]
     return {
         "name": scenario,
         "values": hashlib.sha256(repr(loaded).encode()).hexdigest()[:16],
+        "files": _digest_of_files(
+            resolve(text)
+            for text in _texts(loaded)
+            if text.endswith((".yaml", ".yml"))
+        ),
         "models": models_digest(),
         "version": __version__,
     }
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """All texts in a nest of mappings and sequences."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping):
+        for each in value.values():
+            yield from _texts(each)
+    elif isinstance(value, (list, tuple)):
+        for each in value:
+            yield from _texts(each)
 
 
 def _plain(value: Any) -> Any:

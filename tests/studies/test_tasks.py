@@ -7,6 +7,7 @@ import pytest
 from drake_affetto.errors import InputError
 from drake_affetto.scenario import load_scenario
 from drake_affetto.studies import tasks
+from drake_affetto.studies.store import trial_key
 from drake_affetto.studies.trials import TrialRunner
 
 XY = [0.235, -0.09]
@@ -109,3 +110,27 @@ def test_the_fake_world_offers_what_the_real_one_does(lesson):
         fake_world.run(spec), tasks.run_task(spec), strict=True
     ):
         assert set(ours) == set(theirs)
+
+
+def test_a_trial_is_known_by_all_that_determines_it(tmp_path):
+    """By the content of the files that a scenario names, for instance."""
+    gains = tmp_path / "gains.yaml"
+    mine = tmp_path / "mine.yaml"
+
+    def key(scenario, overlay):
+        tasks._fingerprint.cache_clear()
+        gains.write_text(f"gains: {{waist_yaw: {overlay}}}\n")
+        mine.write_text(f"extends: drumming\n{scenario}\n")
+        return trial_key(tasks.look(str(mine), XY, 1))
+
+    control = f"control: {{overlays: [{gains}]}}"
+    one = "{kP: 1.0e+6, kI: 1.0e+5, kD: 1.0e+4, kF: 4.0e-6}"
+    two = "{kP: 2.0e+6, kI: 1.0e+5, kD: 1.0e+4, kF: 4.0e-6}"
+    first = key(control, one)
+    assert key(control, one) == first
+    assert key(control, two) != first
+    assert key(f"{control}\ngaze: {{tolerance: 0.02}}", one) != first
+    # How a skill is learned is no part of a trial: it is given the outcome.
+    learning = "skill: {n_hidden: 30}\ntransfer: {mapping: similarity}"
+    assert key(f"{control}\n{learning}", one) == first
+    tasks._fingerprint.cache_clear()
