@@ -41,7 +41,12 @@ def studies(tmp_path_factory):
             crew,
             DrumPlan(demonstrations=5, evaluations=4, repeats=2, active=True),
         )
-        plan = MirrorPlan(repeats=2, evaluations=3, demonstrations=6)
+        plan = MirrorPlan(
+            scenario="mirror_and_camera",
+            repeats=2,
+            evaluations=3,
+            demonstrations=6,
+        )
         mirror = run_mirror(crew, plan).results
     every = {
         "study": "scenarios",
@@ -93,7 +98,7 @@ def test_conditions_are_changed_one_at_a_time(tmp_path, monkeypatch):
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
     monkeypatch.setattr(campaign, "run_task", fake_world.run)
-    words = "--samples 3 4 --repeats 2 --evaluations 2 --demonstrations 5"
+    words = "--samples 3 4 --repeats 1 --evaluations 2 --demonstrations 4"
     monkeypatch.setattr(
         sys,
         "argv",
