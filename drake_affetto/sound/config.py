@@ -20,7 +20,7 @@ class SoundConfig:
 
     voice: VoiceConfig = dataclasses.field(default_factory=VoiceConfig)
     reward: RewardConfig = dataclasses.field(default_factory=RewardConfig)
-    hit_impulse: float = 0.05
+    hit_impulse: float = 2e-3
 
     def check(self, where: str) -> None:
         """Raises InputError naming the field that does not fit."""

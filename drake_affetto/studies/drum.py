@@ -159,8 +159,9 @@ def active_order(
 ) -> list[int]:
     """The order in which a skill would ask for demonstrations.
 
-    Each time the place where its prediction is least certain (greatest
-    leverage) is asked for; for that the robot need only have looked there.
+    Each time that place is asked for without which its predictions would stay
+    least certain, all places taken together: the sum of the leverages that
+    are left is the least. For that the robot need only have looked there.
 
     Args:
         tau: (N, 2) task parameters of the places.
@@ -173,11 +174,16 @@ def active_order(
     skill = make_skill(config, seed)
     order = [first]
     # What was demonstrated does not matter to how certain a prediction is.
-    skill.partial_fit(tau[[first]], np.zeros((1, 1)))
+    nothing = np.zeros((1, 1))
+    skill.partial_fit(tau[[first]], nothing)
     while len(order) < len(tau):
         rest = [i for i in range(len(tau)) if i not in order]
-        order.append(rest[int(np.argmax(skill.leverage(tau[rest])))])
-        skill.partial_fit(tau[[order[-1]]], np.zeros((1, 1)))
+        uncertain = []
+        for i in rest:
+            wiser = copy.deepcopy(skill).partial_fit(tau[[i]], nothing)
+            uncertain.append(wiser.leverage(tau).sum())
+        order.append(rest[int(np.argmin(uncertain))])
+        skill.partial_fit(tau[[order[-1]]], nothing)
     return order
 
 
@@ -241,8 +247,8 @@ def run_drum(crew: Crew, plan: DrumPlan) -> dict[str, Any]:
                 trial_seed(plan.seed, HIDDEN, repeat),
             )
             for n in plan.tried_after:
-                if order == "active" and n == plan.demonstrations:
-                    # At the end both orders know the same.
+                if order == "active" and n in (1, plan.demonstrations):
+                    # First and last, both orders know the same.
                     continue
                 skill = course[n - 1]
                 for place, view in enumerate(views[repeat]):
@@ -340,8 +346,15 @@ def _gather(
         "random": _curve(plan, [r for r in rows if r["order"] == "random"])
     }
     if plan.active:
-        chosen = [r for r in rows if r["order"] == "active"]
-        curves["active"] = _curve(plan, [*chosen, *last])
+        curves["active"] = _curve(
+            plan,
+            [
+                row
+                for row in rows
+                if row["order"] == "active"
+                or row["n"] in (1, plan.demonstrations)
+            ],
+        )
     impulse = sound.hit_impulse
     hits = np.array([row["impulse"] > impulse for row in rows])
     told = separation(
