@@ -133,7 +133,7 @@ def main() -> int:
         check_study_arguments(args)
         out = prepare_output(args.out)
         rows = []
-        with campaign(args, Console()) as crew:
+        with campaign(args, out, Console()) as crew:
             for condition, changes in CONDITIONS.items():
                 name = ": ".join(condition)
                 plan = dataclasses.replace(base, name=name, **changes)

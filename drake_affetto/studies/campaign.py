@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from drake_affetto.errors import InputError, require_range
-from drake_affetto.output import prepare_output
 from drake_affetto.studies.pool import Crew
 from drake_affetto.studies.store import TrialStore
 from drake_affetto.studies.tasks import run_task
@@ -58,14 +57,20 @@ def check_study_arguments(args: argparse.Namespace) -> None:
 
 
 @contextlib.contextmanager
-def campaign(args: argparse.Namespace, console: Any) -> Iterator[Crew]:
+def campaign(
+    args: argparse.Namespace, out: Path, console: Any
+) -> Iterator[Crew]:
     """The crew of a study that was called with the shared options.
+
+    Args:
+        args: the options.
+        out: the study's folder, prepared.
+        console: of rich.
 
     Yields:
         A crew whose trials are kept in the study's folder. On Ctrl-C the
         console is told how to go on.
     """
-    out = prepare_output(args.out)
     with contextlib.ExitStack() as stack:
         store = stack.enter_context(TrialStore(out / STORE))
         for folder in args.reuse:

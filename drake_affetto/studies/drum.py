@@ -146,7 +146,7 @@ def run(args: argparse.Namespace) -> int:
     from rich.console import Console
 
     console = Console()
-    with campaign(args, console) as crew:
+    with campaign(args, out, console) as crew:
         results = run_drum(crew, plan)
     write_json(out / "results.json", results)
     _print(results, console)

@@ -190,7 +190,7 @@ def run(args: argparse.Namespace) -> int:
     console = Console()
     names = changed_views() if args.all_scenarios else [plan.scenario]
     found = {}
-    with campaign(args, console) as crew:
+    with campaign(args, out, console) as crew:
         for name in names:
             outcome = run_mirror(crew, dataclasses.replace(plan, scenario=name))
             found[name] = outcome.results
@@ -264,7 +264,11 @@ def run_mirror(crew: Crew, plan: MirrorPlan) -> MirrorOutcome:
     # Stages are told apart by their names.
     among = f", {plan.name}" if plan.name else ""
     title = Path(plan.scenario).stem + among
-    kept: list[tuple[Any, dict[str, Any], np.ndarray, np.ndarray]] = []
+    skills: list[Any] = []
+    prototypes: list[np.ndarray] = []
+    # Of the first repeat, with the most samples: what can be shown.
+    shown: dict[str, Any] = {}
+    shown_lessons: list[Result] = []
     rows: list[dict[str, Any]] = []
     specs: list[Spec] = []
     lessons_there: list[list[Result]] = []
@@ -289,10 +293,12 @@ def run_mirror(crew: Crew, plan: MirrorPlan) -> MirrorOutcome:
             variability=plan.variability,
             workspace=plan.workspace,
         )
-        skill = learn_skill(
-            direct.skill, lessons, trial_seed(plan.seed, HIDDEN, repeat)
+        skills.append(
+            learn_skill(
+                direct.skill, lessons, trial_seed(plan.seed, HIDDEN, repeat)
+            )
         )
-        kept.append((skill, {}, stack_prototypes(lessons), np.zeros(0)))
+        prototypes.append(stack_prototypes(lessons))
         lessons_there.append(there)
         tests.append(
             draw_positions(
@@ -313,7 +319,6 @@ def run_mirror(crew: Crew, plan: MirrorPlan) -> MirrorOutcome:
         ],
     )
     for repeat, there in enumerate(lessons_there):
-        skill, schemes, prototypes, _ = kept[repeat]
         tau = np.array([result["tau"] for result, _ in there])
         theta = np.array([arrays["theta"] for _, arrays in there])
         seen = views[
@@ -328,10 +333,15 @@ def run_mirror(crew: Crew, plan: MirrorPlan) -> MirrorOutcome:
             )
             for name in plan.schemes:
                 scheme = fit_scheme(
-                    name, skill, tau[chosen], theta[chosen], plan.scenario
+                    name,
+                    skills[repeat],
+                    tau[chosen],
+                    theta[chosen],
+                    plan.scenario,
                 )
-                if count == max(plan.samples):
-                    schemes[name] = scheme
+                if repeat == 0 and count == max(plan.samples):
+                    shown[name] = scheme
+                    shown_lessons = [there[i] for i in chosen]
                 for place, (view, _) in enumerate(seen):
                     row: dict[str, Any] = {
                         "scheme": name,
@@ -350,10 +360,9 @@ def run_mirror(crew: Crew, plan: MirrorPlan) -> MirrorOutcome:
                             tests[repeat][place],
                             trial_seed(plan.seed, _STRIKES, repeat, place),
                             scheme.predict([view["tau"]])[0],
-                            prototypes,
+                            prototypes[repeat],
                         )
                     )
-            kept[repeat] = (skill, schemes, prototypes, chosen)
     outcomes = crew.run(f"Drumming, {title}", specs)
     missed = {"reward": 0.0, "success": False}
     for row in rows:
@@ -361,13 +370,11 @@ def run_mirror(crew: Crew, plan: MirrorPlan) -> MirrorOutcome:
         # What was not found is not struck at.
         told = missed if i is None else outcomes[i][0]
         row.update(reward=told["reward"], success=told["success"])
-    skill, schemes, prototypes, chosen = kept[0]
-    first = [lessons_there[0][i] for i in chosen]
     return MirrorOutcome(
-        results=_gather(plan, rows, _map(plan, skill, schemes, first)),
-        skill=skill,
-        schemes=schemes,
-        prototypes=prototypes,
+        results=_gather(plan, rows, _map(plan, shown, shown_lessons)),
+        skill=skills[0],
+        schemes=shown,
+        prototypes=prototypes[0],
         tests=tests[0],
     )
 
@@ -418,7 +425,6 @@ def _gather(
 
 def _map(
     plan: MirrorPlan,
-    skill: Any,
     schemes: dict[str, Any],
     taught: Sequence[Result],
 ) -> dict[str, Any] | None:
@@ -426,13 +432,14 @@ def _map(
     if "transfer_default" not in schemes:
         return None
     scheme = schemes["transfer_default"]
-    limits = np.array(load_scenario(plan.scenario).skill.input_range)
+    scenario = load_scenario(plan.scenario)
+    limits = np.array(scenario.skill.input_range)
     axes = [np.linspace(low, high, _GRID) for low, high in limits]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     known = np.array([result["tau"] for result, _ in taught])
     centre = ["y_img", "q3* [rad]"]
     fixed = ["x_img", "y_img"]
-    mode = load_scenario(plan.scenario).look.mode
+    mode = scenario.look.mode
     return {
         "scheme": "transfer_default",
         "samples": len(taught),
