@@ -21,14 +21,18 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder
 
+from drake_affetto.experiments.camera_preview import (
+    LookTrial,
+    make_sight,
+    turn_to,
+)
+from drake_affetto.experiments.view_maps import CHANGED_VIEWS, REFERENCE, View
 from drake_affetto.perception.blob import detect
 from drake_affetto.perception.imaging import ImageEffects
 from drake_affetto.perception.mirror_camera import DIRECT, find_frame
-from drake_affetto.scenario import Scenario, load_scenario
 from drake_affetto.scene import world
-from drake_affetto.station import AffettoStation
-from drake_affetto.studies.domains import CHANGED_VIEWS, REFERENCE, View
-from drake_affetto.studies.look import LookTrial, make_sight, turn_to
+from drake_affetto.station.scenario import Scenario, load_scenario
+from drake_affetto.station.station import AffettoStation
 
 LEAST_AREA = 25.0
 

@@ -7,9 +7,9 @@ from pydrake.multibody.plant import AddMultibodyPlant
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from drake_affetto.scenario import load_scenario
 from drake_affetto.scene import world
-from drake_affetto.station import AffettoStation
+from drake_affetto.station.scenario import load_scenario
+from drake_affetto.station.station import AffettoStation
 
 
 def _bare_plant(scenario) -> Simulator:

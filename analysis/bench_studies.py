@@ -7,15 +7,15 @@ import time
 
 import numpy as np
 
-from drake_affetto.scenario import load_scenario
-from drake_affetto.studies.pool import Crew
-from drake_affetto.studies.store import TrialStore
-from drake_affetto.studies.tasks import (
+from drake_affetto.experiments.trials import (
     demonstration,
     draw_positions,
     run_task,
     strike,
 )
+from drake_affetto.runner.executor import TrialExecutor
+from drake_affetto.runner.store import TrialStore
+from drake_affetto.station.scenario import load_scenario
 
 _TRIALS = 40
 
@@ -23,26 +23,26 @@ _TRIALS = 40
 def _strikes(theta, prototypes, first: int, count: int):
     scenario = load_scenario("drumming")
     places = draw_positions(scenario, count, np.random.default_rng(first))
-    return [
-        strike("drumming", xy, first + i, theta, prototypes)
+    return {
+        i: strike("drumming", xy, first + i, theta, prototypes)
         for i, xy in enumerate(places)
-    ]
+    }
 
 
 def measure(workers: int, folder: Path) -> float:
     """Trials a second with so many workers, once they have started."""
     with (
         TrialStore(folder / f"{workers}.sqlite") as store,
-        Crew(run_task, store, workers=workers, quiet=True) as crew,
+        TrialExecutor(run_task, store, workers=workers, quiet=True) as executor,
     ):
-        ((_, arrays),) = crew.run(
-            "lesson", [demonstration("drumming", [0.26, -0.1], 0)]
-        )
+        ((_, arrays),) = executor.run(
+            "demonstration", {0: demonstration("drumming", [0.26, -0.1], 0)}
+        ).values()
         theta, prototypes = arrays["theta"], arrays["prototype"][None]
         # Every worker has built its station after these.
-        crew.run("warm", _strikes(theta, prototypes, 1000, 4 * workers))
+        executor.run("warm", _strikes(theta, prototypes, 1000, 4 * workers))
         begin = time.perf_counter()
-        crew.run("strikes", _strikes(theta, prototypes, 0, _TRIALS))
+        executor.run("strikes", _strikes(theta, prototypes, 0, _TRIALS))
         return _TRIALS / (time.perf_counter() - begin)
 
 

@@ -16,12 +16,12 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from drake_affetto.output import (
+from drake_affetto.common.output import (
     atomic_path,
     prepare_output,
     write_text_atomic,
 )
-from drake_affetto.studies.domains import (
+from drake_affetto.experiments.view_maps import (
     CHANGED_VIEWS,
     REFERENCE,
     CalibrationError,

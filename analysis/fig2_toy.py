@@ -23,9 +23,9 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from drake_affetto.errors import InputError
-from drake_affetto.output import atomic_path, prepare_output
-from drake_affetto.studies import toy
+from drake_affetto.common.errors import InputError
+from drake_affetto.common.output import atomic_path, prepare_output
+from drake_affetto.experiments import toy
 
 
 def grid(low, high, turn, n=60):

@@ -21,8 +21,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from drake_affetto.errors import InputError
-from drake_affetto.output import atomic_path, prepare_output
+from drake_affetto.common.errors import InputError
+from drake_affetto.common.output import atomic_path, prepare_output
 
 NAMES = {
     "unchanged": "unchanged",

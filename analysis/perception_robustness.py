@@ -16,12 +16,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from drake_affetto.output import prepare_output, write_text_atomic
+from drake_affetto.common.output import prepare_output, write_text_atomic
+from drake_affetto.experiments.camera_preview import turn_to, write_image
+from drake_affetto.experiments.view_maps import View
 from drake_affetto.perception.blob import BlobConfig, detect, marker_lab
 from drake_affetto.perception.drawing import Canvas
 from drake_affetto.perception.imaging import ImageEffects, apply_effects
-from drake_affetto.studies.domains import View
-from drake_affetto.studies.look import turn_to, write_image
 
 Array = np.ndarray
 # What the robot's skin and cloth look like, to hide the marker with.

@@ -21,7 +21,7 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.sensors import CameraInfo
 
-from drake_affetto.perception.optics import reflect_camera
+from drake_affetto.geometry.optics import reflect_camera
 from drake_affetto.scene import world
 
 # Rendered twice as large and scaled down: smooth edges.

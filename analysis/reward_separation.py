@@ -16,7 +16,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from drake_affetto.output import atomic_path, prepare_output
+from drake_affetto.common.output import atomic_path, prepare_output
 from drake_affetto.sound.config import load_sound_config
 from drake_affetto.sound.reward import (
     cut_prototype,

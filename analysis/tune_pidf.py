@@ -17,11 +17,11 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from drake_affetto.common.errors import require_file
+from drake_affetto.common.output import atomic_path
 from drake_affetto.control.pidf import load_control
-from drake_affetto.control.tuning import HELD_OUT, TEST
-from drake_affetto.errors import require_file
-from drake_affetto.output import atomic_path
-from drake_affetto.studies.tune import bench, load_plan, run_reference
+from drake_affetto.tuning.references import HELD_OUT, TEST
+from drake_affetto.tuning.study import bench, load_plan, run_reference
 
 DESIRED, BEFORE, AFTER = "0.55", "#d55e00", "#0072b2"
 

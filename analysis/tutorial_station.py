@@ -18,12 +18,12 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput
 
-from drake_affetto.scenario import load_scenario
+from drake_affetto.experiments.episode import TrialRunner
 from drake_affetto.sound.config import load_sound_config
 from drake_affetto.sound.reward import reward, spectrogram, tap_prototypes
 from drake_affetto.sound.voice import DrumVoice
-from drake_affetto.station import AffettoStation
-from drake_affetto.studies.trials import TrialRunner
+from drake_affetto.station.scenario import load_scenario
+from drake_affetto.station.station import AffettoStation
 
 argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
 scenario = load_scenario("drumming")

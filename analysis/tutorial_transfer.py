@@ -15,8 +15,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from drake_affetto.common.output import atomic_path, prepare_output
 from drake_affetto.motion import Dmp
-from drake_affetto.output import atomic_path, prepare_output
 from drake_affetto.skill import (
     SCHEMES,
     ElmRegressor,

@@ -24,14 +24,14 @@ import matplotlib.pyplot as plt
 from rich.console import Console
 
 from drake_affetto import __version__
-from drake_affetto.errors import InputError
-from drake_affetto.output import atomic_path, prepare_output, write_json
-from drake_affetto.studies.campaign import (
+from drake_affetto.cli.study import (
     add_study_arguments,
     campaign,
     check_study_arguments,
 )
-from drake_affetto.studies.mirror import MirrorPlan, run_mirror
+from drake_affetto.common.errors import InputError
+from drake_affetto.common.output import atomic_path, prepare_output, write_json
+from drake_affetto.experiments.mirror import MirrorPlan, run_mirror
 
 # Factor and value, and what that changes in the plan.
 CONDITIONS = {
@@ -133,11 +133,11 @@ def main() -> int:
         check_study_arguments(args)
         out = prepare_output(args.out)
         rows = []
-        with campaign(args, out, Console()) as crew:
+        with campaign(args, out, Console()) as executor:
             for condition, changes in CONDITIONS.items():
                 name = ": ".join(condition)
                 plan = dataclasses.replace(base, name=name, **changes)
-                rows += rows_of(condition, run_mirror(crew, plan).results)
+                rows += rows_of(condition, run_mirror(executor, plan).results)
     except InputError as error:
         print(f"when_transfer_wins: {error}", file=sys.stderr)
         return 2

@@ -15,7 +15,6 @@ import numpy as np
 from pydrake.multibody.plant import AddMultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
-from drake_affetto.scenario import Scenario, load_scenario
 from drake_affetto.scene import world
 from drake_affetto.scene.workspace import (
     Workspace,
@@ -23,6 +22,7 @@ from drake_affetto.scene.workspace import (
     compute_workspace,
     largest_box,
 )
+from drake_affetto.station.scenario import Scenario, load_scenario
 
 _REGIONS = (
     ("reach", "the hand strikes it from above", "#1f77b4"),

@@ -11,8 +11,8 @@ import warnings
 
 from pydrake.systems.analysis import Simulator
 
-from drake_affetto.scenario import load_scenario
-from drake_affetto.station import AffettoStation
+from drake_affetto.station.scenario import load_scenario
+from drake_affetto.station.station import AffettoStation
 
 DURATION = 0.05  # s
 

@@ -17,7 +17,8 @@ PACKAGE = ROOT / "drake_affetto"
 # The way of the signal, then what is built on it. Nothing imports from a later
 # place; what stands in one place may import each other.
 ORDER = [
-    {"", "columns", "errors", "output", "resources", "yaml_config"},
+    {"", "common"},
+    {"geometry"},
     {"scene"},
     {"perception"},
     {"skill"},
@@ -26,29 +27,32 @@ ORDER = [
     {"pneumatics"},
     {"sound"},
     {"teaching"},
-    {"scenario"},
-    {"station"},
-    {"diagram", "view"},
-    {"studies"},
+    {"station", "scenario"},
+    {"robot"},
+    {"runner"},
+    {"experiments"},
+    {"tuning"},
+    {"identification"},
+    {"report"},
     {"cli"},
 ]
 RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
-STAGES = [name for names in ORDER[1:9] for name in names]
+STAGES = [name for names in ORDER[1:10] for name in names]
 
 # The mathematics, which must also serve who has no Drake. The test adds to
 # them every module of a stage that does not import Drake in its own text.
 DRAKE_FREE = {
     "drake_affetto",
-    "drake_affetto.cli",
+    "drake_affetto.cli.main",
     "drake_affetto.control.pidf",
-    "drake_affetto.errors",
+    "drake_affetto.common.errors",
     "drake_affetto.motion.dmp",
-    "drake_affetto.output",
-    "drake_affetto.perception.optics",
+    "drake_affetto.common.output",
+    "drake_affetto.geometry.optics",
     "drake_affetto.pneumatics.chamber",
     "drake_affetto.pneumatics.flow",
-    "drake_affetto.resources",
-    "drake_affetto.scene.kinematics",
+    "drake_affetto.common.resources",
+    "drake_affetto.geometry.kinematics",
     "drake_affetto.skill.elm",
     "drake_affetto.sound.voice",
     "drake_affetto.teaching.stroke",

@@ -23,7 +23,7 @@ assert not pathlib.Path.cwd().is_relative_to(root)
 """
 
 LOAD_MODELS = """
-from drake_affetto import resources
+from drake_affetto.common import resources
 import drake_affetto
 assert pathlib.Path(drake_affetto.__file__).is_relative_to(site)
 models = resources.models_dir()
@@ -97,7 +97,7 @@ def test_wheel_holds_the_package_and_every_model(wheel):
     }
     assert expected - held == set()
     assert "drake_affetto/models/package.xml" in held
-    assert "drake_affetto/studies/report/page.html" in held
+    assert "drake_affetto/report/page.html" in held
 
 
 @pytest.mark.slow
@@ -111,7 +111,7 @@ def test_models_load_outside_the_checkout(site, tmp_path):
 @pytest.mark.slow
 def test_command_starts_outside_the_checkout(site, tmp_path):
     code = PREAMBLE + (
-        "from drake_affetto.cli import main; raise SystemExit(main(['-h']))"
+        "from drake_affetto.cli.main import main;raise SystemExit(main(['-h']))"
     )
     assert "usage: affetto" in run("-c", code, ROOT, site, cwd=tmp_path)
     assert (site / "bin/affetto").is_file()

@@ -18,7 +18,7 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drake_affetto.errors import InputError, require, require_range
+from drake_affetto.common.errors import InputError, require, require_range
 
 DEFAULT_FILE = "package://drake_affetto/control.yaml"
 
@@ -159,7 +159,7 @@ def load_control(
         InputError: for a file or a value that does not fit, by name.
     """
     # Drake's YAML reader is behind this; the mathematics need none of it.
-    from drake_affetto.yaml_config import load_config
+    from drake_affetto.common.yaml_config import load_config
 
     return load_config(ControlParameters, file, overlays)
 

@@ -16,13 +16,13 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
+from drake_affetto.common.errors import require, require_range
 from drake_affetto.control.pidf import (
     DEFAULT_FILE,
     PidfGains,
     load_control,
     pidf_update,
 )
-from drake_affetto.errors import require, require_range
 
 
 @dataclasses.dataclass

@@ -14,7 +14,7 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
-from drake_affetto.errors import require, require_range
+from drake_affetto.common.errors import require, require_range
 from drake_affetto.motion.dmp import Dmp
 
 

@@ -18,10 +18,10 @@ import math
 
 import numpy as np
 
-from drake_affetto.perception import optics
+from drake_affetto.geometry import optics
+from drake_affetto.geometry.optics import Camera
 from drake_affetto.perception.blob import Blob
-from drake_affetto.perception.optics import Camera
-from drake_affetto.perception.sight_model import Mirror
+from drake_affetto.perception.camera_model import Mirror
 
 Array = np.ndarray
 

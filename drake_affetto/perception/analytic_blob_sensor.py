@@ -14,7 +14,8 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
-from drake_affetto.errors import InputError, require
+from drake_affetto.common.errors import InputError, require
+from drake_affetto.geometry.optics import project_disc
 from drake_affetto.perception.analytic import (
     Hiders,
     completed,
@@ -29,7 +30,6 @@ from drake_affetto.perception.mirror_camera import (
     Sight,
     find_frame,
 )
-from drake_affetto.perception.optics import project_disc
 
 
 class AnalyticBlobSensor(BlobReporter):

@@ -14,7 +14,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from drake_affetto.errors import InputError, require, require_range
+from drake_affetto.common.errors import InputError, require, require_range
 
 Array = np.ndarray
 

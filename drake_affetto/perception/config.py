@@ -9,14 +9,14 @@ import math
 
 import numpy as np
 
-from drake_affetto.errors import require, require_range
-from drake_affetto.perception.imaging import ImageEffects
-from drake_affetto.perception.optics import (
+from drake_affetto.common.errors import require, require_range
+from drake_affetto.geometry.optics import (
     Camera,
     FisheyeCamera,
     PinholeCamera,
     make_pose,
 )
+from drake_affetto.perception.imaging import ImageEffects
 
 # Beyond it a pinhole's image of a wide-angle view is far too large.
 _MAX_ANGLE = 1.3

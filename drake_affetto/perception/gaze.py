@@ -22,7 +22,7 @@ import math
 
 import numpy as np
 
-from drake_affetto.errors import require, require_range
+from drake_affetto.common.errors import require, require_range
 
 Array = np.ndarray
 

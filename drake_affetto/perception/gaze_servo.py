@@ -14,7 +14,8 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
-from drake_affetto.errors import require, require_range
+from drake_affetto.common.errors import require, require_range
+from drake_affetto.geometry.optics import Camera
 from drake_affetto.perception.blob import BlobCalibration
 from drake_affetto.perception.gaze import (
     TAU_1,
@@ -25,7 +26,6 @@ from drake_affetto.perception.gaze import (
     GazeTask,
     GazeView,
 )
-from drake_affetto.perception.optics import Camera
 
 
 def gaze_view(camera: Camera, calibration: BlobCalibration) -> GazeView:

@@ -35,7 +35,15 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.sensors import CameraInfo, ImageLabel16I, ImageRgba8U
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
+from drake_affetto.geometry.optics import (
+    FisheyeCamera,
+    MirrorView,
+    PinholeCamera,
+    mirror_view,
+    reflect_camera,
+)
+from drake_affetto.perception.camera_model import Mirror
 from drake_affetto.perception.config import (
     CameraConfig,
     MirrorConfig,
@@ -47,14 +55,6 @@ from drake_affetto.perception.imaging import (
     apply_effects,
     composite_mirror,
 )
-from drake_affetto.perception.optics import (
-    FisheyeCamera,
-    MirrorView,
-    PinholeCamera,
-    mirror_view,
-    reflect_camera,
-)
-from drake_affetto.perception.sight_model import Mirror
 
 DIRECT = "direct"
 MIRROR = "mirror"

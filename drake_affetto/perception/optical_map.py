@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from drake_affetto.perception import optics
+from drake_affetto.geometry import optics
 from drake_affetto.perception.blob import BlobCalibration
-from drake_affetto.perception.sight_model import SightModel, turn_points
+from drake_affetto.perception.camera_model import SightModel, turn_points
 
 Array = np.ndarray
 

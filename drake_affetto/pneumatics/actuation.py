@@ -16,7 +16,7 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
-from drake_affetto.errors import require, require_range
+from drake_affetto.common.errors import require, require_range
 from drake_affetto.pneumatics.chamber import (
     FLOW_MODE,
     REGULATOR_MODE,

@@ -12,7 +12,7 @@ from pydrake.math import sqrt
 from pydrake.systems.framework import BasicVector_, Context_, LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-from drake_affetto.errors import require
+from drake_affetto.common.errors import require
 from drake_affetto.pneumatics.chamber import ROWS, Row
 from drake_affetto.pneumatics.flow import (
     GAS_CONSTANT,

@@ -19,7 +19,7 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drake_affetto.errors import require
+from drake_affetto.common.errors import require
 
 GAS_CONSTANT = 287.05
 """Specific gas constant of dry air, J/(kg K)."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drake_affetto.errors import InputError, require, require_range
+from drake_affetto.common.errors import InputError, require, require_range
 from drake_affetto.pneumatics.chamber import (
     ROWS,
     Row,
@@ -280,7 +280,7 @@ def load_parameters(
         InputError: for a file or a value that does not fit, by name.
     """
     # Drake's YAML reader is behind this; the mathematics need none of it.
-    from drake_affetto.yaml_config import load_config
+    from drake_affetto.common.yaml_config import load_config
 
     return load_config(PneumaticParameters, file, overlays)
 

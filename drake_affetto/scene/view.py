@@ -14,7 +14,7 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.visualization import AddFrameTriadIllustration
 
-from drake_affetto.errors import require_range
+from drake_affetto.common.errors import require_range
 from drake_affetto.scene import world
 
 _STOP = "Stop"

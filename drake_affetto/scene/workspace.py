@@ -13,9 +13,9 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
-from drake_affetto.errors import require, require_range
+from drake_affetto.common.errors import require, require_range
+from drake_affetto.geometry.kinematics import SerialChain, solve_position
 from drake_affetto.scene import world
-from drake_affetto.scene.kinematics import SerialChain, solve_position
 from drake_affetto.scene.sight import (
     View,
     disc,

@@ -35,9 +35,9 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
-from drake_affetto.errors import InputError, require, require_range
-from drake_affetto.resources import configure_parser, resolve
-from drake_affetto.scene.kinematics import SerialChain
+from drake_affetto.common.errors import InputError, require, require_range
+from drake_affetto.common.resources import configure_parser, resolve
+from drake_affetto.geometry.kinematics import SerialChain
 
 ACTIVE_JOINTS = (
     "waist_roll",

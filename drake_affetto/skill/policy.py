@@ -17,7 +17,7 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
-from drake_affetto.errors import InputError, require, require_range
+from drake_affetto.common.errors import InputError, require, require_range
 
 
 class Regressor(Protocol):

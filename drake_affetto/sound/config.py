@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from drake_affetto.errors import require_range
+from drake_affetto.common.errors import require_range
 from drake_affetto.sound.reward import RewardConfig
 from drake_affetto.sound.voice import VoiceConfig
 
@@ -39,6 +39,6 @@ def load_sound_config(
             value out of range.
     """
     # Drake's YAML reader, which the mathematics beside this do not need.
-    from drake_affetto.yaml_config import load_config
+    from drake_affetto.common.yaml_config import load_config
 
     return load_config(SoundConfig, uri)

@@ -10,7 +10,7 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drake_affetto.errors import require
+from drake_affetto.common.errors import require
 
 FloatArray = NDArray[np.float64]
 

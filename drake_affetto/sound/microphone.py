@@ -18,7 +18,7 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
-from drake_affetto.errors import require
+from drake_affetto.common.errors import require
 
 
 class DrumMicrophone(LeafSystem):

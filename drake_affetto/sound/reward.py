@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft, ndimage, signal
 
-from drake_affetto.errors import require, require_range
+from drake_affetto.common.errors import require, require_range
 from drake_affetto.sound import impact
 from drake_affetto.sound.voice import DrumVoice
 

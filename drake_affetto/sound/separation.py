@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from drake_affetto.errors import require
+from drake_affetto.common.errors import require
 from drake_affetto.sound import impact
 from drake_affetto.sound.reward import SUCCESS_THRESHOLD
 from drake_affetto.sound.voice import DrumVoice

@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import linalg, signal, special
 from scipy.io import wavfile
 
-from drake_affetto.errors import InputError, require, require_range
+from drake_affetto.common.errors import InputError, require, require_range
 
 _AIR_DENSITY = 1.2  # kg/m^3
 _SOUND_SPEED = 343.0  # m/s

@@ -28,9 +28,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import drake_affetto
-from drake_affetto.columns import read_columns
-from drake_affetto.errors import InputError, require, require_file
-from drake_affetto.output import atomic_path
+from drake_affetto.common.csv_columns import read_columns
+from drake_affetto.common.errors import InputError, require, require_file
+from drake_affetto.common.output import atomic_path
 
 FloatArray = NDArray[np.float64]
 

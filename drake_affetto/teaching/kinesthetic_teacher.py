@@ -19,7 +19,7 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
-from drake_affetto.errors import require
+from drake_affetto.common.errors import require
 from drake_affetto.teaching.stroke import (
     Stroke,
     TeacherConfig,

@@ -22,7 +22,7 @@ from pydrake.systems.framework import (
 )
 from pydrake.visualization import ApplyVisualizationConfig, VisualizationConfig
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.teaching.stroke import TeacherConfig
 
 # The field by which Drake offers its mouse spring.

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from drake_affetto.errors import require_range
+from drake_affetto.common.errors import require_range
 
 
 @dataclasses.dataclass

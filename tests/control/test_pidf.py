@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
+from drake_affetto.common.errors import InputError
 from drake_affetto.control.pidf import PidfGains, load_control, pidf_update
-from drake_affetto.errors import InputError
 
 GAINS = PidfGains(kP=[5e5], kI=[3e5], kD=[2e4], kF=[5e-6])
 

@@ -11,9 +11,9 @@ from pydrake.systems.primitives import (
 )
 import pytest
 
+from drake_affetto.common.errors import InputError
 from drake_affetto.control.pidf import PidfGains, load_control, pidf_update
 from drake_affetto.control.pidf_controller import PidfConfig, PidfController
-from drake_affetto.errors import InputError
 from drake_affetto.pneumatics.actuation import (
     PneumaticActuation,
     PneumaticActuationConfig,

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 import pytest
 from scipy.integrate import solve_ivp
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.motion import Dmp, DmpConfig
 
 LOG = (

@@ -1,13 +1,12 @@
 """The renderer-free twin against geometry and against rendered images."""
 
 import numpy as np
-import perception_scene as scene
 from pydrake.common.value import Value
 import pytest
-from test_mirror_camera import World
 
-from drake_affetto.errors import InputError
-from drake_affetto.perception import optics
+from drake_affetto.common.errors import InputError
+from drake_affetto.geometry import optics
+from drake_affetto.geometry.optics import PinholeCamera
 from drake_affetto.perception.analytic import (
     Hiders,
     measured_blob,
@@ -16,10 +15,11 @@ from drake_affetto.perception.analytic import (
 from drake_affetto.perception.analytic_blob_sensor import AnalyticBlobSensor
 from drake_affetto.perception.blob import BlobCalibration, BlobConfig
 from drake_affetto.perception.blob_sensor import BlobSensor
+from drake_affetto.perception.camera_model import Mirror
 from drake_affetto.perception.config import CameraConfig, rotation_matrix
 from drake_affetto.perception.imaging import ImageEffects
-from drake_affetto.perception.optics import PinholeCamera
-from drake_affetto.perception.sight_model import Mirror
+from support import perception_scene as scene
+from support.camera_world import World
 
 CAMERA = PinholeCamera.from_fov(320, 240, 0.9)
 EYE = np.eye(4)

@@ -6,7 +6,7 @@ from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.sensors import ImageRgba8U
 import pytest
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.perception.blob import BlobCalibration, BlobConfig
 from drake_affetto.perception.blob_sensor import BlobSensor
 

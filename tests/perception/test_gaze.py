@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.perception import gaze
 from drake_affetto.perception.gaze import (
     Gaze,

@@ -7,7 +7,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 import pytest
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
+from drake_affetto.geometry.optics import PinholeCamera
 from drake_affetto.perception.blob import BlobCalibration
 from drake_affetto.perception.gaze import (
     PHASE,
@@ -18,7 +19,6 @@ from drake_affetto.perception.gaze import (
     GazeView,
 )
 from drake_affetto.perception.gaze_servo import GazeServo, gaze_view
-from drake_affetto.perception.optics import PinholeCamera
 
 VIEW = GazeView(center_x=0.5, width=1.0, height_per_width=0.75, focal=0.8)
 MARKER = 0.25

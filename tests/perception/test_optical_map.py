@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from test_sight_model import FISHEYE, MIRROR, make
 
 from drake_affetto.perception.blob import BlobCalibration
 from drake_affetto.perception.optical_map import OpticalMap
@@ -14,6 +13,7 @@ from drake_affetto.skill.elm import ElmRegressor
 from drake_affetto.skill.mappings import Domain
 from drake_affetto.skill.optical import OpticalMapping
 from drake_affetto.skill.transfer import TransferRegressor
+from support.trunk_camera import FISHEYE, MIRROR, make
 
 YAW = 0.9
 DIRECT = BlobCalibration(-0.5, 319.5, 40.0, 180.0)

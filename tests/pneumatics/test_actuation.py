@@ -1,6 +1,5 @@
 """The actuation system: ports, state, a plant in the loop."""
 
-from actuator_bench import closed, make_parameters
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
@@ -13,7 +12,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, VectorLogSink
 import pytest
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.pneumatics.actuation import (
     PneumaticActuation,
     PneumaticActuationConfig,
@@ -29,6 +28,7 @@ from drake_affetto.pneumatics.parameters import (
     load_parameters,
     resting_pressure,
 )
+from support.actuator_bench import closed, make_parameters
 
 N = 3
 

@@ -3,20 +3,12 @@
 import math
 from xml.etree import ElementTree
 
-from actuator_bench import (
-    ATMOSPHERE,
-    Q_LOWER,
-    Q_UPPER,
-    SUPPLY,
-    Actuators,
-    closed,
-    make_parameters,
-)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
 
+from drake_affetto.common.resources import models_dir
 from drake_affetto.pneumatics.chamber import (
     REGULATOR_MODE,
     Row,
@@ -34,7 +26,15 @@ from drake_affetto.pneumatics.parameters import (
     closed_stiffness,
     load_parameters,
 )
-from drake_affetto.resources import models_dir
+from support.actuator_bench import (
+    ATMOSPHERE,
+    Q_LOWER,
+    Q_UPPER,
+    SUPPLY,
+    Actuators,
+    closed,
+    make_parameters,
+)
 
 T0 = REFERENCE_TEMPERATURE
 

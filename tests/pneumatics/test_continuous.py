@@ -1,6 +1,5 @@
 """The continuous twin, and the discrete actuators against it."""
 
-from actuator_bench import Actuators, make_parameters
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -19,12 +18,13 @@ from pydrake.systems.primitives import TrajectorySource, VectorLogSink
 from pydrake.trajectories import PiecewisePolynomial
 import pytest
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.pneumatics.chamber import FLOW_MODE, REGULATOR_MODE, Row
 from drake_affetto.pneumatics.continuous import (
     ContinuousPneumaticActuation,
     ContinuousPneumaticActuation_,
 )
+from support.actuator_bench import Actuators, make_parameters
 
 
 def integrate(array, mode, times, commands, angle, start):

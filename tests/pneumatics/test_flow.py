@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.pneumatics.flow import (
     LAMINAR_RATIO,
     REFERENCE_DENSITY,

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.pneumatics.chamber import Row
 from drake_affetto.pneumatics.parameters import (
     ActuatorClass,

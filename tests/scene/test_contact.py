@@ -17,8 +17,8 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo
 import pytest
 
+from drake_affetto.geometry.kinematics import solve_position
 from drake_affetto.scene import world
-from drake_affetto.scene.kinematics import solve_position
 
 ARM = [
     "right_shoulder_abduction",

@@ -12,7 +12,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JointIndex
 import pytest
 
-from drake_affetto.resources import models_dir
+from drake_affetto.common.resources import models_dir
 from drake_affetto.scene import world
 
 # name, lower, upper [deg], length to the next joint [m], mass [kg], class

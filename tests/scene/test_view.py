@@ -5,7 +5,7 @@ import time
 from pydrake.geometry import Meshcat, MeshcatParams
 import pytest
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.scene.view import view_model
 from drake_affetto.scene.world import WorldConfig
 

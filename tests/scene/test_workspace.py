@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.scene import world
 from drake_affetto.scene.sight import View, disc, on_panel, reflect
 from drake_affetto.scene.workspace import (

@@ -4,7 +4,7 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.scene import world
 
 ACTIVE = [

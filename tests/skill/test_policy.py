@@ -5,7 +5,7 @@ from numpy.testing import assert_allclose
 from pydrake.systems.analysis import Simulator
 import pytest
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.skill import ElmRegressor
 from drake_affetto.skill.policy import SkillPolicy, SkillPolicyConfig
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.sound.impact import Hand, contact_force, stroke
 
 

@@ -20,8 +20,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 import pytest
 
-from drake_affetto.errors import InputError
-from drake_affetto.resources import configure_parser, resolve
+from drake_affetto.common.errors import InputError
+from drake_affetto.common.resources import configure_parser, resolve
 from drake_affetto.sound.microphone import DrumMicrophone
 
 GRAVITY = 9.81

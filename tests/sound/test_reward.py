@@ -9,7 +9,7 @@ from hypothesis.extra import numpy as hnp
 import numpy as np
 import pytest
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.sound import config as sound_config
 from drake_affetto.sound.reward import (
     RewardConfig,

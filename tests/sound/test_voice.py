@@ -8,7 +8,7 @@ import pytest
 from scipy import integrate, signal, special
 from scipy.io import wavfile
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.sound import impact
 from drake_affetto.sound.voice import (
     BodyConfig,

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import drake_affetto
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.teaching.demonstrations import (
     ROBOT_LOG_JOINTS,
     Demonstration,

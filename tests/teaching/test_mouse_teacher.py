@@ -1,6 +1,5 @@
 """A person's pull by mouse: where it acts, how strong, and on what."""
 
-from mouse_messages import drag_message
 import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform, RotationMatrix
@@ -15,10 +14,11 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.visualization import VisualizationConfig
 import pytest
 
-from drake_affetto.errors import InputError
+from drake_affetto.common.errors import InputError
 from drake_affetto.teaching import mouse_teacher
 from drake_affetto.teaching.mouse_teacher import MouseTeacher
 from drake_affetto.teaching.stroke import TeacherConfig
+from support.mouse_messages import drag_message
 
 MASS = 0.06
 CONFIG = TeacherConfig()

@@ -1,0 +1,1 @@
+"""The `affetto` command: one small file a sub-command."""

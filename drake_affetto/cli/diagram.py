@@ -1,0 +1,60 @@
+"""`affetto diagram`: draws a station's systems and their connections."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from drake_affetto.common.errors import require
+from drake_affetto.common.output import (
+    prepare_output,
+)
+from drake_affetto.station.diagram_drawing import _check_suffix, write_diagram
+
+if TYPE_CHECKING:
+    pass
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of `affetto diagram`."""
+    parser.add_argument(
+        "--scenario",
+        metavar="NAME",
+        default="drumming",
+        help="a scenario's name, or its YAML file",
+    )
+    parser.add_argument(
+        "--out",
+        metavar="FILE",
+        type=Path,
+        default=Path("out/diagram.svg"),
+        help="the picture (.svg, .png, .pdf) or its source (.dot, .gv)",
+    )
+    parser.add_argument(
+        "--depth",
+        metavar="N",
+        type=int,
+        default=1,
+        help="how deep nested Diagrams are opened",
+    )
+    parser.add_argument(
+        "--all-ports",
+        action="store_true",
+        help="also draw the ports that nothing is connected to",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Builds the scenario's station and draws it."""
+    path = _check_suffix(args.out)
+    require(args.depth >= 0, "--depth", args.depth, "0 or more")
+    from drake_affetto.station.scenario import load_scenario
+    from drake_affetto.station.station import AffettoStation
+
+    scenario = load_scenario(args.scenario)
+    prepare_output(path.parent)
+    station = AffettoStation(scenario)
+    write_diagram(station, path, args.depth, all_ports=args.all_ports)
+    print(path)
+    return 0

@@ -1,0 +1,40 @@
+"""`affetto view`: the robot in a browser, with a slider for each joint."""
+
+import argparse
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares the command's options."""
+    parser.add_argument(
+        "--scenario",
+        default="drumming",
+        help="a scenario's name, or a YAML file",
+    )
+    parser.add_argument(
+        "--frames",
+        action="store_true",
+        help="draw the frames of camera, palm, mirror and drum",
+    )
+    parser.add_argument(
+        "--time-limit",
+        type=float,
+        default=None,
+        metavar="SECONDS",
+        help="stop by itself after that time",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Shows the scenario's world until told to stop; returns the exit code."""
+    from drake_affetto.scene.view import view_model
+    from drake_affetto.station.scenario import load_scenario
+
+    posture = view_model(
+        load_scenario(args.scenario).world,
+        time_limit=args.time_limit,
+        frames=args.frames,
+    )
+    print("The posture it was left in [rad]:")
+    for name, angle in posture.items():
+        print(f"  {name}: {angle:.3f}")
+    return 0

@@ -1,0 +1,144 @@
+"""Output folders and files that are either whole or not there.
+
+Nothing here imports more than the standard library: a command checks its
+output folder before it imports anything heavy.
+"""
+
+from collections.abc import Iterator
+import contextlib
+import json
+import math
+import os
+from pathlib import Path
+import secrets
+from typing import Any
+
+from drake_affetto.common.errors import InputError
+
+
+def prepare_output(path: str | Path) -> Path:
+    """Makes the folder `path` with its parents, and sees that it takes files.
+
+    Returns:
+        The folder, with a leading `~` expanded.
+
+    Raises:
+        InputError: if it cannot be made or written. No folder that was made on
+            the way is then left behind.
+    """
+    made: list[Path] = []
+    try:
+        if not str(path):
+            raise InputError("the output folder has no name")
+        folder = Path(path).expanduser()
+        missing = [p for p in (folder, *folder.parents) if not p.exists()]
+        for each in reversed(missing):
+            each.mkdir(exist_ok=True)
+            made.append(each)
+        if not folder.is_dir():
+            raise InputError(f"the output folder {path} is a file")
+        # Permission bits do not tell (of root, of read-only mounts); a file
+        # does.
+        probe = _sibling(folder / "probe.tmp")
+        os.close(os.open(probe, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
+        probe.unlink()
+    except (OSError, ValueError, RuntimeError) as error:
+        for each in reversed(made):
+            with contextlib.suppress(OSError):
+                each.rmdir()
+        if isinstance(error, InputError):
+            raise
+        raise InputError(
+            f"the output folder {path} cannot be written: {_reason(error)}"
+        ) from error
+    return folder
+
+
+@contextlib.contextmanager
+def atomic_path(path: str | Path) -> Iterator[Path]:
+    """A path to write to, which becomes `path` where the block succeeds.
+
+    It stands in the folder of `path`, has its suffix (many writers go by that)
+    and is removed where the block fails; `path` then stays as it was.
+
+    Raises:
+        InputError: for an operating system's error, in the block or in the
+            renaming: no such folder, no permission, a full disk.
+    """
+    path = Path(path)
+    fresh = _sibling(path)
+    try:
+        yield fresh
+        os.replace(fresh, path)
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {_reason(error)}") from error
+    finally:
+        with contextlib.suppress(OSError):
+            fresh.unlink()
+
+
+def write_bytes_atomic(path: str | Path, data: bytes) -> None:
+    """Writes `data` to `path`, whole or not at all.
+
+    Raises:
+        InputError: if it cannot be written.
+    """
+    with atomic_path(path) as fresh, fresh.open("xb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def write_text_atomic(path: str | Path, text: str) -> None:
+    """Writes `text` to `path` in UTF-8, whole or not at all.
+
+    Raises:
+        InputError: if it cannot be written.
+    """
+    write_bytes_atomic(path, text.encode("utf-8"))
+
+
+def write_json(path: str | Path, obj: Any) -> None:
+    """Writes `obj` to `path` as JSON, whole or not at all.
+
+    Numpy's arrays and scalars become lists and numbers. Keys keep their order,
+    and floats are written so that reading gives back the same number.
+
+    Raises:
+        InputError: if `path` cannot be written.
+        ValueError: for a number that is not finite, which JSON cannot hold;
+            the message names its place.
+        TypeError: for what has no form in JSON.
+    """
+    plain = _plain(obj, "")
+    text = json.dumps(plain, indent=2, allow_nan=False, ensure_ascii=False)
+    write_text_atomic(path, text + "\n")
+
+
+def _plain(obj: Any, where: str) -> Any:
+    """`obj` in the standard types that JSON knows."""
+    if hasattr(obj, "tolist"):
+        obj = obj.tolist()
+    if isinstance(obj, float) and not math.isfinite(obj):
+        raise ValueError(f"{where or 'the value'} is {obj}: not for JSON")
+    if isinstance(obj, dict):
+        return {
+            str(key): _plain(value, f"{where}.{key}".lstrip("."))
+            for key, value in obj.items()
+        }
+    if isinstance(obj, (list, tuple)):
+        return [_plain(value, f"{where}[{i}]") for i, value in enumerate(obj)]
+    if isinstance(obj, os.PathLike):
+        return os.fspath(obj)
+    return obj
+
+
+def _sibling(path: Path) -> Path:
+    """A new, hidden name beside `path`, with its suffix."""
+    token = secrets.token_hex(4)
+    return path.with_name(f".{path.stem[:100]}.{token}{path.suffix}")
+
+
+def _reason(error: Exception) -> str:
+    """What went wrong, without a number and the path once more."""
+    return getattr(error, "strerror", None) or str(error)

@@ -1,0 +1,204 @@
+"""Reads typed YAML, and says in one line what in it does not fit."""
+
+from collections.abc import Mapping, Sequence
+import copy
+import dataclasses
+import difflib
+from pathlib import Path
+import types
+import typing
+from typing import Any, Protocol, TypeVar
+
+from pydrake.common.yaml import yaml_load_typed
+import yaml
+
+from drake_affetto.common.errors import InputError
+from drake_affetto.common.resources import resolve
+
+
+class _Checked(Protocol):
+    """A dataclass with defaults that knows what values make sense."""
+
+    def check(self, where: str) -> None: ...
+
+
+Schema = TypeVar("Schema")
+Config = TypeVar("Config", bound=_Checked)
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """The mapping that the file `path` holds.
+
+    Raises:
+        InputError: if the file cannot be read, is not YAML, or holds anything
+            but a mapping.
+    """
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is not UTF-8 text") from error
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f" in line {mark.line + 1}" if mark is not None else ""
+        problem = getattr(error, "problem", None) or "it cannot be parsed"
+        raise InputError(f"{path} is not YAML: {problem}{where}") from error
+    if data is None:
+        data = {}
+    if not isinstance(data, dict):
+        raise InputError(f"{path} holds no mapping at its top")
+    return data
+
+
+def typed(
+    schema: type[Schema],
+    data: dict[str, Any],
+    *,
+    where: str,
+    defaults: Schema | None = None,
+) -> Schema:
+    """Fills a `schema` dataclass from `data` by Drake's YAML rules.
+
+    Args:
+        where: how an error names the whole, for instance the file.
+        defaults: what holds where `data` is silent.
+
+    Raises:
+        InputError: for an unknown field or a value of the wrong type, by name.
+    """
+    _refuse_unknown(data, schema, where)
+    # Drake's reader takes some misfits (the letters of a word for a list).
+    misfit = _first_misfit(data, schema, where)
+    if misfit is not None:
+        raise InputError(misfit)
+    try:
+        return yaml_load_typed(
+            schema=schema,
+            data=yaml.safe_dump(data),
+            defaults=copy.deepcopy(defaults),
+            retain_map_defaults=True,
+        )
+    except (
+        RuntimeError,
+        TypeError,
+        ValueError,
+        AssertionError,
+        AttributeError,
+    ) as error:
+        raise InputError(f"{where}: {error}") from error
+
+
+def load_config(
+    schema: type[Config], file: str | Path, overlays: Sequence[str | Path] = ()
+) -> Config:
+    """Reads a file over the defaults of `schema`, and checks the whole.
+
+    Args:
+        schema: a dataclass with defaults and a method `check(where)`.
+        file: the file, or its package:// URI.
+        overlays: further ones, each holding only what it changes.
+
+    Raises:
+        InputError: for a file or a value that does not fit, by name.
+    """
+    config = schema()
+    for item in (file, *overlays):
+        path = resolve(item)
+        config = typed(
+            schema, read_yaml(path), where=path.name, defaults=config
+        )
+    config.check(resolve(file).name)
+    return config
+
+
+def _fields(schema: Any) -> dict[str, Any]:
+    """Names and types of the fields of a schema, or {} for anything else."""
+    if dataclasses.is_dataclass(schema):
+        hints = typing.get_type_hints(schema)
+        return {f.name: hints[f.name] for f in dataclasses.fields(schema)}
+    if hasattr(schema, "__fields__"):
+        return {f.name: f.type for f in schema.__fields__}
+    return {}
+
+
+def _strip_optional(schema: Any) -> Any:
+    if typing.get_origin(schema) in (typing.Union, types.UnionType):
+        rest = [a for a in typing.get_args(schema) if a is not type(None)]
+        if len(rest) == 1:
+            return rest[0]
+    return schema
+
+
+def _refuse_unknown(data: Any, schema: Any, where: str) -> None:
+    schema = _strip_optional(schema)
+    origin, args = typing.get_origin(schema), typing.get_args(schema)
+    if origin is list and isinstance(data, list):
+        for i, item in enumerate(data):
+            _refuse_unknown(item, args[0], f"{where}[{i}]")
+    elif origin in (dict, Mapping) and isinstance(data, Mapping):
+        for key, item in data.items():
+            _refuse_unknown(item, args[1], f"{where}.{key}")
+    fields = _fields(schema)
+    if not fields or not isinstance(data, Mapping):
+        return
+    for key, item in data.items():
+        if key == "_tag":
+            continue
+        if key not in fields:
+            near = difflib.get_close_matches(str(key), fields, n=1)
+            hint = (
+                f"did you mean {near[0]!r}?"
+                if near
+                else (f"known are {', '.join(fields)}")
+            )
+            raise InputError(f"{where} has no field {key!r}; {hint}")
+        _refuse_unknown(item, fields[key], f"{where}.{key}")
+
+
+_SCALARS = {int: "a whole number", float: "a number", str: "text"}
+
+
+def _first_misfit(data: Any, schema: Any, where: str) -> str | None:
+    """Says which value of `data` does not have the type of `schema`."""
+    if typing.get_origin(schema) in (typing.Union, types.UnionType) and (
+        data is None
+    ):
+        return None
+    schema = _strip_optional(schema)
+    origin, args = typing.get_origin(schema), typing.get_args(schema)
+    expected = None
+    if schema is bool and not isinstance(data, bool):
+        expected = "true or false"
+    elif schema in _SCALARS:
+        try:
+            fits = not isinstance(data, (list, dict, type(None), bool))
+            fits = fits and (schema is not int or int(data) == data)
+            schema(data)
+        except (TypeError, ValueError):
+            fits = False
+        if not fits:
+            expected = _SCALARS[schema]
+    elif origin is list:
+        if not isinstance(data, list):
+            expected = "a list"
+        else:
+            for i, item in enumerate(data):
+                found = _first_misfit(item, args[0], f"{where}[{i}]")
+                if found:
+                    return found
+    elif origin in (dict, Mapping) or _fields(schema):
+        if not isinstance(data, Mapping):
+            expected = "a mapping"
+        else:
+            fields = _fields(schema)
+            for key, item in data.items():
+                kind = args[1] if not fields else fields.get(key)
+                if kind is None:
+                    continue
+                found = _first_misfit(item, kind, f"{where}.{key}")
+                if found:
+                    return found
+    if expected is None:
+        return None
+    return f"{where} is {data!r}, expected {expected}"

@@ -1,0 +1,147 @@
+"""Success rates with their uncertainty, and schemes held against each other.
+
+Trials come in repeats: those of one repeat share what was taught and learned,
+so they are not independent of each other. All here respects that.
+"""
+
+from collections.abc import Mapping, Sequence
+import itertools
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import stats
+
+from drake_affetto.common.errors import require
+
+# Up to how many repeats all sign changes are gone through (2^n of them).
+_EXACT = 14
+_RESAMPLES = 20_000
+
+
+def success_rate(successes: ArrayLike, level: float = 0.95) -> dict[str, float]:
+    """Mean success and its confidence interval.
+
+    Wilson's interval; where repeats differ from each other by more than
+    chance, the number of trials counts for less (design effect).
+
+    Args:
+        successes: booleans (repeats, trials).
+        level: of confidence.
+
+    Returns:
+        mean, low and high.
+
+    Raises:
+        InputError: if there is no trial.
+    """
+    table = np.asarray(successes, dtype=float)
+    require(
+        table.ndim == 2 and table.size > 0,
+        "successes",
+        f"an array of shape {table.shape}",
+        "repeats and trials, at least one of each",
+    )
+    mean = float(table.mean())
+    n = table.size / _design_effect(table)
+    z = stats.norm.ppf(0.5 + 0.5 * level)
+    middle = (mean + z**2 / (2.0 * n)) / (1.0 + z**2 / n)
+    half = (z / (1.0 + z**2 / n)) * np.sqrt(
+        mean * (1.0 - mean) / n + (z / (2.0 * n)) ** 2
+    )
+    return {
+        "mean": mean,
+        "low": float(max(0.0, min(mean, middle - half))),
+        "high": float(min(1.0, max(mean, middle + half))),
+    }
+
+
+def _design_effect(table: np.ndarray) -> float:
+    """How many times the variance of the mean exceeds that of a binomial."""
+    repeats, trials = table.shape
+    mean = table.mean()
+    if repeats < 2 or mean in (0.0, 1.0):
+        return 1.0
+    between = table.mean(axis=1).var(ddof=1) / repeats
+    binomial = mean * (1.0 - mean) / (repeats * trials)
+    return float(np.clip(between / binomial, 1.0, trials))
+
+
+def paired_p(first: ArrayLike, second: ArrayLike) -> float:
+    """p of "neither is better", for successes (repeats,) under each of two.
+
+    A permutation test on the differences within repeats: if neither is
+    better, each difference might as well have the other sign. Two-sided;
+    exact up to 14 repeats.
+    """
+    difference = np.asarray(first, float) - np.asarray(second, float)
+    require(
+        difference.ndim == 1 and difference.size > 0,
+        "first",
+        f"an array of shape {difference.shape}",
+        "one number for each repeat",
+    )
+    if len(difference) < 2:
+        return 1.0
+    result = stats.permutation_test(
+        (difference,),
+        lambda x, axis: np.mean(x, axis=axis),
+        permutation_type="samples",
+        vectorized=True,
+        n_resamples=np.inf if len(difference) <= _EXACT else _RESAMPLES,
+        rng=np.random.default_rng(0),
+    )
+    return float(min(1.0, result.pvalue))
+
+
+def holm(p: Sequence[float]) -> list[float]:
+    """p values corrected for their number, by Holm's step-down method."""
+    values = np.asarray(p, float)
+    order = np.argsort(values, kind="stable")
+    steps = (len(values) - np.arange(len(values))) * values[order]
+    corrected = np.empty(len(values))
+    corrected[order] = np.minimum(1.0, np.maximum.accumulate(steps))
+    return corrected.tolist()
+
+
+def cohens_h(first: float, second: float) -> float:
+    """Effect size of the difference between two rates, -π to π.
+
+    By Cohen 0.2 is called small, 0.5 medium and 0.8 large.
+    """
+    a, b = (2.0 * np.arcsin(np.sqrt(rate)) for rate in (first, second))
+    return float(a - b)
+
+
+def compare(
+    successes: Mapping[str, np.ndarray], samples: int
+) -> list[dict[str, Any]]:
+    """Every pair of schemes, the correction being for all pairs together.
+
+    Args:
+        successes: by scheme, booleans (repeats, trials); trial j of repeat i
+            is the same place with the same noise for all.
+        samples: how many samples the schemes were given; it is only noted.
+
+    Returns:
+        For each pair a, b, samples, difference (of rates), p, p_corrected and
+        effect_size.
+    """
+    rows: list[dict[str, Any]] = []
+    for a, b in itertools.combinations(successes, 2):
+        first, second = (np.asarray(successes[s], float) for s in (a, b))
+        rows.append(
+            {
+                "a": a,
+                "b": b,
+                "samples": samples,
+                "difference": float(first.mean() - second.mean()),
+                "p": paired_p(first.sum(axis=1), second.sum(axis=1)),
+                "effect_size": cohens_h(first.mean(), second.mean()),
+            }
+        )
+    corrected = holm([row["p"] for row in rows])
+    return [
+        {**row, "p_corrected": value}
+        for row, value in zip(rows, corrected, strict=True)
+    ]

@@ -1,0 +1,1 @@
+"""Geometry of cameras, mirrors and joint chains: arrays in, arrays out."""

@@ -1,0 +1,1 @@
+"""Fits the actuators to the logs of a robot."""

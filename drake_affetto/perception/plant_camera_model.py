@@ -1,0 +1,97 @@
+"""The geometry of seeing, as read from a plant: see `sight_model`."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from pydrake.geometry import Cylinder, Role, SceneGraphInspector
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import Context
+
+from drake_affetto.common.errors import InputError
+from drake_affetto.perception.blob import BlobCalibration, calibrate
+from drake_affetto.perception.camera_model import Mirror, SightModel
+from drake_affetto.perception.config import CameraConfig
+from drake_affetto.perception.mirror_camera import MirrorCamera, find_frame
+from drake_affetto.scene import world
+
+
+def marker_radius(
+    plant: MultibodyPlant, inspector: SceneGraphInspector
+) -> float:
+    """Radius [m] of the drum's marker, from its visual geometry.
+
+    Raises:
+        InputError: if the drum has no visual cylinder named `marker`.
+    """
+    body = find_frame(plant, "drum::marker").body()
+    frame = plant.GetBodyFrameIdOrThrow(body.index())
+    for geometry in inspector.GetGeometries(frame, Role.kPerception):
+        shape = inspector.GetShape(geometry)
+        name = inspector.GetName(geometry).rpartition("::")[2]
+        if name == "marker" and isinstance(shape, Cylinder):
+            return float(shape.radius())
+    raise InputError("the drum's model has no visual cylinder named 'marker'")
+
+
+def make_sight_model(
+    plant: MultibodyPlant,
+    context: Context,
+    config: CameraConfig,
+    yaw_joint: str,
+) -> SightModel:
+    """The sight model at the posture and drum height of a plant's context.
+
+    Args:
+        plant: the finalized plant, wired to its SceneGraph.
+        context: the plant's context; its posture is that of all joints but
+            the yaw.
+        config: the camera.
+        yaw_joint: the joint by which the camera turns.
+    """
+    frame = find_frame(plant, config.frame)
+    query: Any = plant.get_geometry_query_input_port().Eval(context)
+    return SightModel.from_chain(
+        config.model(),
+        world.serial_chain(plant, frame.name()),
+        yaw_joint,
+        world.get_posture(plant, context),
+        float(world.marker_position(plant, context)[2]),
+        marker_radius(plant, query.inspector()),
+        config.X_FC(),
+    )
+
+
+def mirrors_in_world(camera: MirrorCamera, context: Context) -> list[Mirror]:
+    """The mirrors that a camera knows, where they are in its context."""
+    return [
+        Mirror(X_WM.GetAsMatrix4(), width, height)
+        for X_WM, width, height in camera.mirrors(context)
+    ]
+
+
+def calibrate_view(
+    sight: SightModel,
+    positions: np.ndarray,
+    fixed_yaw: float | None = None,
+    mirrors: Sequence[Mirror] = (),
+    margin: float = 0.05,
+) -> BlobCalibration:
+    """The box of pixels for a workspace of drum positions (n, 2).
+
+    Args:
+        sight: the geometry of seeing.
+        positions: where the drum may stand, x and y in W [m].
+        fixed_yaw: the yaw [rad] to look from; None to centre the marker, and
+            then x spans the whole image.
+        mirrors: in which the marker may be seen.
+        margin: what to add on each side, as a fraction of the box.
+
+    Raises:
+        InputError: if the marker is seen at fewer than 3 places.
+    """
+    if fixed_yaw is None:
+        _, pixels = sight.direct_pixels(positions)
+        return calibrate(pixels, margin, sight.camera.width)
+    pixels = sight.fixed_yaw_pixels(positions, fixed_yaw, mirrors)
+    return calibrate(pixels, margin)

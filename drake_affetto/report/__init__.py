@@ -1,0 +1,37 @@
+"""`affetto report`: the results of studies as one page that tells the story.
+
+The page is a single file that needs no network: charts, pictures, sounds and
+the replay are in it.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from drake_affetto.common.errors import require
+from drake_affetto.common.output import prepare_output, write_text_atomic
+
+
+def write_report(folders: Sequence[Path], path: Path) -> Path:
+    """Writes one self-contained page about the studies in `folders`.
+
+    Args:
+        folders: of finished studies, each of another kind.
+        path: of the page; its folder is made if need be.
+
+    Returns:
+        The path, with a leading `~` expanded.
+
+    Raises:
+        InputError: if a folder is not that of a finished study with a place
+            on the page, two are of one kind, a file is damaged or of another
+            version, or the page cannot be written.
+    """
+    from drake_affetto.report.data import read_sources
+    from drake_affetto.report.page import make_page
+
+    path = Path(path).expanduser()
+    require(not path.is_dir(), "--out", str(path), "a file, not a folder")
+    page = make_page(read_sources(folders))
+    prepare_output(path.parent)
+    write_text_atomic(path, page)
+    return path

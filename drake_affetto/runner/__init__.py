@@ -1,0 +1,1 @@
+"""Runs keyed tasks on workers and keeps their results; knows no robot."""

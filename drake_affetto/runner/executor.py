@@ -1,0 +1,154 @@
+"""Runs planned trials on workers, and keeps each as it finishes.
+
+Planning is apart from running: a plan is a mapping of specs (plain mappings
+that determine a trial wholly), and any `concurrent.futures.Executor` may run
+it.
+"""
+
+from collections.abc import Callable, Hashable, Mapping
+from concurrent.futures import Executor
+from typing import Any, TypeVar
+
+import numpy as np
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.text import Text
+
+from drake_affetto.runner.store import TrialStore, trial_key
+from drake_affetto.runner.workers import WorkerPool
+
+Spec = Mapping[str, Any]
+Arrays = dict[str, np.ndarray]
+Result = tuple[dict[str, Any], Arrays]
+Key = TypeVar("Key", bound=Hashable)
+
+
+class _RateColumn(ProgressColumn):
+    """How many trials are finished in a second, or seconds each takes."""
+
+    def render(self, task: Task) -> Text:
+        speed = task.finished_speed or task.speed
+        if not speed:
+            return Text("")
+        return Text(f"{speed:.1f}/s" if speed >= 1.0 else f"{1 / speed:.1f} s")
+
+
+class TrialExecutor:
+    """Workers, a store and a progress display, for the phases of one study."""
+
+    def __init__(
+        self,
+        run: Callable[[Spec], Result],
+        store: TrialStore,
+        *,
+        workers: int = 2,
+        executor: Executor | None = None,
+        quiet: bool = False,
+    ):
+        """Takes `run`, a module's function, that runs one spec.
+
+        Args:
+            run: Runs one spec; it is sent to other processes.
+            store: Where finished trials are kept.
+            workers: Number of processes; see `make_executor`.
+            executor: Any other executor, such as a Dask cluster's, instead of
+                worker processes. It is left open.
+            quiet: Whether there is no progress display.
+        """
+        self._run = run
+        self._store = store
+        self._pool = WorkerPool(workers, executor)
+        self._progress = Progress(
+            TextColumn("{task.description:<32}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            _RateColumn(),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+            disable=quiet,
+        )
+        self.reused = 0
+
+    def __enter__(self) -> "TrialExecutor":
+        self._progress.start()
+        return self
+
+    def __exit__(self, *exception: Any) -> None:
+        self._progress.stop()
+        self._pool.__exit__(*exception)
+
+    def run(
+        self,
+        label: str,
+        specs: Mapping[Key, Spec],
+        on_result: Callable[[Key, Result], None] | None = None,
+    ) -> dict[Key, Result]:
+        """Runs those of `specs` that the store does not have.
+
+        Equal specs are one trial. A trial whose worker dies is tried again.
+
+        Args:
+            label: Name of this phase of the study.
+            specs: What to run, each under a key of the caller's choice.
+            on_result: Called with each result as soon as it is there, those
+                of the store included.
+
+        Returns:
+            The result of each spec under the spec's key, in the order of
+            `specs`, whichever worker finished first.
+
+        Raises:
+            InputError: If workers die again and again.
+        """
+        self._store.plan(label, list(specs.values()))
+        # Equal specs are one trial: they share a key in the store.
+        asked: dict[str, list[Key]] = {}
+        trials: dict[str, Spec] = {}
+        for key, spec in specs.items():
+            trial = trial_key(spec)
+            asked.setdefault(trial, []).append(key)
+            trials[trial] = spec
+        results: dict[Key, Result] = {}
+
+        def keep(trial: str) -> bool:
+            # As the store gives it back: a resumed study and one that was
+            # not disturbed see the same numbers.
+            result = self._store.get(trials[trial])
+            if result is None:
+                return False
+            for key in asked[trial]:
+                results[key] = result
+                if on_result is not None:
+                    on_result(key, result)
+            return True
+
+        missing = dict.fromkeys(trial for trial in trials if not keep(trial))
+        self.reused += len(trials) - len(missing)
+        bar = self._progress.add_task(
+            label, total=len(trials), completed=len(trials) - len(missing)
+        )
+
+        def put(trial: str, result: Result) -> None:
+            self._store.put(trials[trial], *result)
+            keep(trial)
+            del missing[trial]
+            self._progress.advance(bar)
+
+        self._pool.run(
+            self._run,
+            lambda: {trial: (trials[trial],) for trial in missing},
+            put,
+            label=label,
+            on_death=lambda dead: self._progress.console.print(
+                f"{label}: {dead} died; its trials are tried again"
+            ),
+        )
+        return {key: results[key] for key in specs}

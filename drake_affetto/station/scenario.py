@@ -1,0 +1,334 @@
+"""A scenario: everything that a station is built from, as typed YAML."""
+
+import dataclasses
+import difflib
+from pathlib import Path
+from typing import Any
+
+from pydrake.multibody.plant import MultibodyPlantConfig
+from pydrake.systems.analysis import SimulatorConfig
+
+from drake_affetto.common.errors import InputError, require, require_range
+from drake_affetto.common.resources import models_dir
+from drake_affetto.common.yaml_config import read_yaml, typed
+from drake_affetto.control.pidf_controller import PidfConfig
+from drake_affetto.motion.dmp import DmpConfig
+from drake_affetto.perception.blob import BlobConfig
+from drake_affetto.perception.config import (
+    CameraConfig,
+    MirrorConfig,
+    RenderConfig,
+)
+from drake_affetto.perception.gaze import GazeConfig
+from drake_affetto.pneumatics.actuation import PneumaticActuationConfig
+from drake_affetto.scene.world import ACTIVE_JOINTS, WorldConfig
+from drake_affetto.skill.policy import SkillPolicyConfig
+from drake_affetto.sound.config import load_sound_config
+from drake_affetto.teaching.stroke import TeacherConfig
+
+# A file names here the scenario whose values hold where it is silent.
+_EXTENDS = "extends"
+
+
+@dataclasses.dataclass
+class DrumRegion:
+    """Where trials put the drum: a box on the table, in the world frame.
+
+    Attributes:
+        x: lower and upper limit of the drum's centre, m.
+        y: lower and upper limit of the drum's centre, m.
+    """
+
+    x: list[float] = dataclasses.field(default_factory=lambda: [0.2, 0.27])
+    y: list[float] = dataclasses.field(default_factory=lambda: [-0.15, -0.03])
+
+    def check(self, where: str) -> None:
+        """Raises InputError unless both are intervals."""
+        for name in ("x", "y"):
+            value = getattr(self, name)
+            require(
+                len(value) == 2 and value[0] < value[1],
+                f"{where}.{name}",
+                value,
+                "a lower and a greater upper limit",
+            )
+
+
+@dataclasses.dataclass
+class LookConfig:
+    """How the robot looks for the drum.
+
+    Attributes:
+        mode: "centre": the upper body turns until the marker is centred,
+            τ = [y_img, q3*]. "fixed_yaw": it turns to a given yaw,
+            τ̂ = [x_img, y_img].
+        fixed_yaw: that yaw, rad.
+    """
+
+    mode: str = "centre"
+    fixed_yaw: float = 0.0
+
+    def check(self, where: str) -> None:
+        """Raises InputError naming the first field that does not fit."""
+        require(
+            self.mode in ("centre", "fixed_yaw"),
+            f"{where}.mode",
+            self.mode,
+            "'centre' or 'fixed_yaw'",
+        )
+        require_range(f"{where}.fixed_yaw", self.fixed_yaw, -1.6, 1.6)
+
+
+@dataclasses.dataclass
+class SkillConfig:
+    """The parameterised skill (paper Eqs. 3 and 4).
+
+    Attributes:
+        n_hidden: H, hidden neurons of the ELM.
+        alpha: λ, ridge of its read-out.
+        weight_scale: standard deviation of its input weights and biases.
+        input_range: lower and upper limit of each task parameter, by which
+            inputs are scaled; one pair each.
+    """
+
+    n_hidden: int = 50
+    alpha: float = 1e-4
+    weight_scale: float = 1.0
+    input_range: list[list[float]] = dataclasses.field(
+        default_factory=lambda: [[0.0, 1.0], [0.0, 1.0]]
+    )
+
+    def check(self, where: str) -> None:
+        """Raises InputError naming the first field that does not fit."""
+        require_range(f"{where}.n_hidden", self.n_hidden, 1, 10_000)
+        require_range(f"{where}.alpha", self.alpha, 0.0, 1e3)
+        require_range(f"{where}.weight_scale", self.weight_scale, 1e-3, 1e3)
+        require(
+            len(self.input_range) == 2
+            and all(len(r) == 2 and r[0] < r[1] for r in self.input_range),
+            f"{where}.input_range",
+            self.input_range,
+            "a lower and a greater upper limit for each of 2 task parameters",
+        )
+
+
+@dataclasses.dataclass
+class TransferConfig:
+    """How the skill is transferred to this scenario's view, by default.
+
+    Attributes:
+        mapping: the family of h. "affine": Hτ̂ + c; "similarity": a turn, a
+            scale and a shift; "optical": a mirror's plane is learned, and the
+            camera is known.
+        residual: whether what the map leaves over is learned too, as a smooth
+            departure.
+    """
+
+    mapping: str = "affine"
+    residual: bool = False
+
+    def check(self, where: str) -> None:
+        """Raises InputError naming the first field that does not fit."""
+        known = ("affine", "similarity", "optical")
+        require(
+            self.mapping in known,
+            f"{where}.mapping",
+            self.mapping,
+            f"one of {', '.join(known)}",
+        )
+
+
+@dataclasses.dataclass
+class Scenario:
+    """What a station is built from; field names as in Drake's scenarios.
+
+    Attributes:
+        random_seed: seed of whatever is random in a simulation.
+        simulation_duration: s, of a trial that nobody stops earlier.
+        settling_duration: s, in which the robot comes to rest at its start
+            posture before the first trial.
+        simulator_config: Drake's own.
+        plant_config: Drake's own; its time step is also the actuators'.
+        world: models, the drum's default place, and the robot's posture: of
+            active joints the start posture, of others where they are locked.
+        active_joints: the joints that move, in the order of every vector; the
+            others are locked.
+        yaw_joint: the active joint by which the gaze turns (q3).
+        drum_region: where trials put the drum.
+        camera, mirrors, rendering, blob, gaze: see `perception`.
+        look: by turning to the drum, or from a fixed yaw.
+        skill, policy: see `skill`.
+        transfer: of a skill that was learned in another view.
+        dmp: see `motion`.
+        control: see `control`.
+        pneumatics: see `pneumatics`.
+        sound: YAML file of the drum's voice and of the reward.
+        teaching: see `teaching`.
+        motion_source: "skill": the robot looks, and moves as its skill says.
+            "external": `affetto.desired_state` is an input of the station.
+        valve_source: "pidf": the valves are controlled (Eq. 7). "external":
+            `affetto.valve_opening` is an input of the station (or
+            `affetto.pressure_command` with pressure regulators).
+    """
+
+    random_seed: int = 0
+    simulation_duration: float = 8.0
+    settling_duration: float = 2.0
+    simulator_config: SimulatorConfig = dataclasses.field(
+        default_factory=SimulatorConfig
+    )
+    plant_config: MultibodyPlantConfig = dataclasses.field(
+        default_factory=lambda: MultibodyPlantConfig(
+            time_step=0.001,
+            contact_model="point",
+            discrete_contact_approximation="lagged",
+        )
+    )
+    world: WorldConfig = dataclasses.field(default_factory=WorldConfig)
+    active_joints: list[str] = dataclasses.field(
+        default_factory=lambda: list(ACTIVE_JOINTS)
+    )
+    yaw_joint: str = "waist_yaw"
+    drum_region: DrumRegion = dataclasses.field(default_factory=DrumRegion)
+    camera: CameraConfig = dataclasses.field(default_factory=CameraConfig)
+    mirrors: list[MirrorConfig] = dataclasses.field(
+        default_factory=lambda: [MirrorConfig()]
+    )
+    rendering: RenderConfig = dataclasses.field(default_factory=RenderConfig)
+    blob: BlobConfig = dataclasses.field(default_factory=BlobConfig)
+    gaze: GazeConfig = dataclasses.field(default_factory=GazeConfig)
+    look: LookConfig = dataclasses.field(default_factory=LookConfig)
+    skill: SkillConfig = dataclasses.field(default_factory=SkillConfig)
+    transfer: TransferConfig = dataclasses.field(default_factory=TransferConfig)
+    policy: SkillPolicyConfig = dataclasses.field(
+        default_factory=SkillPolicyConfig
+    )
+    dmp: DmpConfig = dataclasses.field(default_factory=DmpConfig)
+    control: PidfConfig = dataclasses.field(default_factory=PidfConfig)
+    pneumatics: PneumaticActuationConfig = dataclasses.field(
+        default_factory=PneumaticActuationConfig
+    )
+    sound: str = "package://drake_affetto/sound.yaml"
+    teaching: TeacherConfig = dataclasses.field(default_factory=TeacherConfig)
+    motion_source: str = "skill"
+    valve_source: str = "pidf"
+
+    def check(self, where: str = "scenario") -> None:
+        """Checks everything that can be checked without building anything.
+
+        Raises:
+            InputError: naming the first field that does not fit.
+        """
+        require_range(f"{where}.random_seed", self.random_seed, 0, 2**31 - 1)
+        require_range(
+            f"{where}.simulation_duration", self.simulation_duration, 0, 3600
+        )
+        require_range(
+            f"{where}.settling_duration", self.settling_duration, 0.1, 60
+        )
+        require_range(
+            f"{where}.plant_config.time_step",
+            self.plant_config.time_step,
+            1e-5,
+            2e-3,
+        )
+        require(
+            len(set(self.active_joints)) == len(self.active_joints) > 0,
+            f"{where}.active_joints",
+            self.active_joints,
+            "at least one joint, none of them twice",
+        )
+        require(
+            self.yaw_joint in self.active_joints,
+            f"{where}.yaw_joint",
+            self.yaw_joint,
+            f"one of the active joints {', '.join(self.active_joints)}",
+        )
+        require(
+            self.motion_source in ("skill", "external"),
+            f"{where}.motion_source",
+            self.motion_source,
+            "'skill' or 'external'",
+        )
+        require(
+            self.valve_source in ("pidf", "external"),
+            f"{where}.valve_source",
+            self.valve_source,
+            "'pidf' or 'external'",
+        )
+        require(
+            self.valve_source == "external" or self.pneumatics.mode == "flow",
+            f"{where}.pneumatics.mode",
+            self.pneumatics.mode,
+            "'flow' where the valves are controlled by PIDF (Eq. 7)",
+        )
+        load_sound_config(self.sound)
+        for i, mirror in enumerate(self.mirrors):
+            mirror.check(f"{where}.mirrors[{i}]")
+        for field in dataclasses.fields(self):
+            part: Any = getattr(self, field.name)
+            if hasattr(part, "check"):
+                part.check(f"{where}.{field.name}")
+
+
+def scenario_names() -> list[str]:
+    """The scenarios that come with the package."""
+    return sorted(p.stem for p in (models_dir() / "scenarios").glob("*.yaml"))
+
+
+def load_scenario(name: str | Path) -> Scenario:
+    """Loads a scenario by its name, or from a YAML file of one's own.
+
+    A file may begin with `extends: NAME` (a name or a path); the values of
+    that scenario then hold wherever the file is silent.
+
+    Args:
+        name: for instance "drumming" or "mirror"; whatever ends in .yaml or
+            .yml is a path.
+
+    Raises:
+        InputError: if there is no such scenario, it is not YAML, or a field
+            is unknown, of the wrong type or out of range.
+    """
+    path = _find(name)
+    scenario = _load(path, ())
+    scenario.check(path.stem)
+    return scenario
+
+
+def _find(name: str | Path) -> Path:
+    text = str(name)
+    if text.endswith((".yaml", ".yml")):
+        path = Path(text)
+        if not path.is_file():
+            raise InputError(f"no such scenario file: {text}")
+        return path
+    path = models_dir() / "scenarios" / f"{text}.yaml"
+    if not path.is_file() or Path(text).name != text:
+        known = scenario_names()
+        near = difflib.get_close_matches(text, known, n=1)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise InputError(
+            f"no scenario {text!r}; {hint}known are {', '.join(known)}"
+        )
+    return path
+
+
+def _load(path: Path, seen: tuple[Path, ...]) -> Scenario:
+    path = path.resolve()
+    if path in seen:
+        raise InputError(f"{path} extends itself")
+    data = read_yaml(path)
+    base = data.pop(_EXTENDS, None)
+    defaults = None
+    if base is not None:
+        require(
+            isinstance(base, str),
+            f"{path.stem}.{_EXTENDS}",
+            base,
+            "the name of a scenario",
+        )
+        if base.endswith((".yaml", ".yml")):
+            base = path.parent / base
+        defaults = _load(_find(base), (*seen, path))
+    return typed(Scenario, data, where=path.stem, defaults=defaults)

@@ -1,0 +1,553 @@
+"""The one Diagram: robot, drum and mirror, and all that acts on them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydrake.geometry import (
+    Meshcat,
+    MeshcatVisualizer,
+    MeshcatVisualizerParams,
+    SceneGraph,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant
+from pydrake.systems.framework import (
+    Context,
+    Diagram,
+    DiagramBuilder,
+    LeafSystem,
+    OutputPort,
+)
+from pydrake.systems.primitives import (
+    Adder,
+    ConstantVectorSource,
+    MatrixGain,
+    PassThrough,
+)
+from pydrake.systems.sensors import CameraInfo
+
+from drake_affetto.common.errors import require
+from drake_affetto.control.pidf_controller import PidfController
+from drake_affetto.motion.dmp import Dmp
+from drake_affetto.motion.dmp_source import DmpSource
+from drake_affetto.perception.analytic_blob_sensor import AnalyticBlobSensor
+from drake_affetto.perception.blob_sensor import BlobSensor
+from drake_affetto.perception.gaze import GazeMode, GazeTask
+from drake_affetto.perception.gaze_servo import GazeServo, gaze_view
+from drake_affetto.perception.mirror_camera import MirrorCamera
+from drake_affetto.perception.plant_camera_model import marker_radius
+from drake_affetto.pneumatics.actuation import PneumaticActuation
+from drake_affetto.scene import world
+from drake_affetto.skill.policy import SkillPolicy
+from drake_affetto.sound.microphone import DrumMicrophone
+from drake_affetto.station.scenario import Scenario
+from drake_affetto.teaching.kinesthetic_teacher import KinestheticTeacher
+from drake_affetto.teaching.mouse_teacher import MouseTeacher
+
+_MODES = {"centre": GazeMode.CENTRE, "fixed_yaw": GazeMode.FIXED_YAW}
+
+
+class AffettoStation(Diagram):
+    """Affetto at its drum: plant, pneumatics, control, sight and hearing.
+
+    Built once and used for any number of trials: the drum's place, the
+    posture, what is taught and what is played are parameters and state of the
+    context (`set_drum_position`, `reset`, and the systems' own setters).
+
+    Joints that are not active are locked in the context; contexts from
+    `CreateDefaultContext` of this class are ready. A `Simulator` made without
+    a context makes its own: call `reset` on it first.
+
+    .. pydrake_system::
+
+        name: AffettoStation
+        input_ports:
+        - affetto.desired_state (motion_source external)
+        - affetto.valve_opening (valve_source external, flow mode)
+        - affetto.pressure_command (valve_source external, regulator mode)
+        output_ports:
+        - affetto.estimated_state
+        - affetto.desired_state
+        - affetto.valve_opening
+        - affetto.pid_output
+        - affetto.actuation
+        - affetto.chamber_pressure
+        - affetto.mass_flow
+        - affetto.policy_parameters
+        - affetto.start_time
+        - affetto.task_parameter
+        - affetto.settled
+        - camera.color_image
+        - camera.label_image
+        - camera.blob
+        - camera.blob_pixels
+        - drum.contact_force
+        - drum.knock_force
+        - teacher.pulling_force
+
+    With n active joints, in the scenario's order:
+
+    - affetto.estimated_state, affetto.desired_state (2n): rad, rad/s.
+    - affetto.valve_opening (n): v⁺ in [-1, 1].
+    - affetto.pid_output (n): u_PID, Pa.
+    - affetto.actuation (n): N m.
+    - affetto.chamber_pressure (2n): [p_a; p_b], Pa absolute.
+    - affetto.mass_flow (2n): into the chambers, kg/s.
+    - affetto.policy_parameters (n·K): θ, rad/s².
+    - affetto.start_time (1): when θ is played, s.
+    - affetto.task_parameter (2): τ or τ̂.
+    - affetto.settled (1): whether τ is final.
+    - camera.color_image (ImageRgba8U), camera.label_image (ImageLabel16I):
+      calculated when evaluated.
+    - camera.blob (3), camera.blob_pixels (4): see `BlobSensor`.
+    - drum.contact_force (2): N on the head, m from its centre.
+    - drum.knock_force (2): N on the shell, N on the table.
+    - teacher.pulling_force (3): N, in the world.
+
+    The ports of the gaze and the skill are there only with motion_source
+    "skill", those of the controller only with valve_source "pidf".
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        meshcat: Meshcat | None = None,
+        meshcat_params: MeshcatVisualizerParams | None = None,
+        *,
+        by_mouse: bool = False,
+    ):
+        """Builds the diagram.
+
+        Args:
+            scenario: from `load_scenario`; it is checked again.
+            meshcat: shows the robot there as it moves.
+            meshcat_params: how it is shown; Drake's defaults if None.
+            by_mouse: whoever drags the hand in `meshcat` teaches, in place of
+                the simulated teacher (Ctrl and the left button).
+
+        Raises:
+            InputError: if the scenario does not fit itself or the models, or
+                this version of Drake has no mouse spring.
+        """
+        super().__init__()
+        scenario.check()
+        require(
+            meshcat is not None or not by_mouse,
+            "by_mouse",
+            by_mouse,
+            "False without a meshcat",
+        )
+        self.scenario = scenario
+        builder = DiagramBuilder()
+        self.plant: MultibodyPlant
+        self.scene_graph: SceneGraph
+        self.plant, self.scene_graph = AddMultibodyPlant(
+            scenario.plant_config, builder
+        )
+        world.add_world(self.plant, scenario.world)
+        self.plant.Finalize()
+        self.joints = world.select_joints(self.plant, scenario.active_joints)
+        self._yaw = scenario.active_joints.index(scenario.yaw_joint)
+        self._robot = self.plant.GetModelInstanceByName("affetto")
+        self.start_posture = np.array(
+            [
+                world.get_joint(self.plant, name).get_default_angle()
+                for name in self.joints.names
+            ]
+        )
+        self._estimated_state = self._add_estimation(builder)
+        self._add_teacher(builder, meshcat if by_mouse else None)
+        self._add_actuation(builder)
+        self._add_sight(builder)
+        self._add_hearing(builder)
+        desired = self._add_motion(builder)
+        self._add_control(builder, desired)
+        if meshcat is not None:
+            MeshcatVisualizer.AddToBuilder(
+                builder,
+                self.scene_graph,
+                meshcat,
+                meshcat_params or MeshcatVisualizerParams(),
+            )
+        builder.BuildInto(self)
+        self.set_name("affetto_station")
+
+    @property
+    def num_joints(self) -> int:
+        """n, how many joints are active."""
+        return len(self.joints.names)
+
+    @property
+    def camera_info(self) -> CameraInfo:
+        """The camera's intrinsics."""
+        return self.camera.camera_info
+
+    @property
+    def mirrors(self) -> list[tuple[RigidTransform, float, float]]:
+        """(X_WM, width, height) of each mirror; M's z is its normal."""
+        return self.camera.mirrors(
+            self.camera.GetMyContextFromRoot(self.CreateDefaultContext())
+        )
+
+    def CreateDefaultContext(self) -> Context:
+        """A context at the start posture, inactive joints locked."""
+        context = super().CreateDefaultContext()
+        self.reset(context)
+        return context
+
+    def reset(self, context: Context) -> None:
+        """Puts robot, drum and all systems where a trial starts.
+
+        The robot rests at the start posture: the pressures in its chambers
+        carry gravity and the controller's integral asks for just these. The
+        time is left as it is.
+
+        Args:
+            context: the station's, also within a context of a larger diagram.
+        """
+        mine = self._mine(context)
+        self.SetDefaultContext(mine)
+        world.lock_inactive(
+            self.plant,
+            self._sub(self.plant, context),
+            self.joints.names,
+        )
+        self._balance_gravity(context)
+        if self.scenario.motion_source == "skill":
+            look = self.scenario.look
+            self.gaze.set_task(
+                self._sub(self.gaze, context),
+                GazeTask(
+                    enabled=False,
+                    mode=_MODES[look.mode],
+                    fixed_yaw=look.fixed_yaw,
+                    start_yaw=float(self.start_posture[self._yaw]),
+                ),
+            )
+            self.dmp_source.set_start_posture(
+                self._sub(self.dmp_source, context), self.start_posture
+            )
+
+    def _balance_gravity(self, context: Context) -> None:
+        """Pressures about their resting value that hold the posture."""
+        plant_context = self._sub(self.plant, context)
+        gravity = self.plant.GetVelocitiesFromArray(
+            self._robot,
+            self.plant.CalcGravityGeneralizedForces(plant_context),
+        )
+        torque = -gravity[self.joints.velocities]
+        actuation = self._sub(self.actuation, context)
+        p_a, p_b = self.actuation.pressures_for_torque(actuation, torque)
+        self.actuation.set_pressures(actuation, p_a, p_b)
+        if self.scenario.valve_source == "pidf":
+            controller = self._sub(self.controller, context)
+            self.controller.reset(controller, p_a - p_b)
+            self.controller.set_integral(controller, p_a - p_b)
+
+    def set_drum_position(self, context: Context, xy: ArrayLike) -> None:
+        """Puts the drum at xy (2,), m, on the table in the world frame.
+
+        Raises:
+            InputError: if it would not stand wholly on the table.
+        """
+        world.set_drum_position(self.plant, self._sub(self.plant, context), xy)
+
+    def drum_position(self, context: Context) -> np.ndarray:
+        """Where the drum stands, (2,) m in the world frame."""
+        return world.get_drum_position(
+            self.plant, self._sub(self.plant, context)
+        )
+
+    def marker_position(self, context: Context) -> np.ndarray:
+        """p_WMarker, the centre of the drum's marker, (3,) m."""
+        return world.marker_position(self.plant, self._sub(self.plant, context))
+
+    def head_center_position(self, context: Context) -> np.ndarray:
+        """The middle of the drum's head, (3,) m in the world."""
+        return world.head_center_position(
+            self.plant, self._sub(self.plant, context)
+        )
+
+    def touching_position(self, context: Context) -> np.ndarray:
+        """Where the palm is as the hand touches the head's middle, (3,) m."""
+        radius = world.hand_radius(self.plant, self._sub(self.plant, context))
+        return self.head_center_position(context) + [0.0, 0.0, radius]
+
+    def camera_pose(self, context: Context) -> RigidTransform:
+        """X_WC; C looks along z, with x to the right and y down."""
+        return self.camera.camera_pose(self._sub(self.camera, context))
+
+    def set_posture(self, context: Context, q: ArrayLike) -> None:
+        """Sets the active joints to q (n,), rad, at rest.
+
+        Raises:
+            InputError: if an angle is beyond its joint's limits.
+        """
+        world.set_posture(
+            self.plant,
+            self._sub(self.plant, context),
+            dict(zip(self.joints.names, np.asarray(q, float), strict=True)),
+        )
+
+    def _mine(self, context: Context) -> Context:
+        """The station's context, from itself or from the root's."""
+        try:
+            self.ValidateContext(context)
+        except RuntimeError:
+            return self.GetMyMutableContextFromRoot(context)
+        return context
+
+    def _sub(self, system: LeafSystem, context: Context) -> Context:
+        """The system's context, from the station's or from the root's."""
+        return self.GetMutableSubsystemContext(system, self._mine(context))
+
+    def _add_estimation(self, builder: DiagramBuilder) -> OutputPort:
+        select = builder.AddNamedSystem(
+            "joint_state", MatrixGain(D=self.joints.state_matrix)
+        )
+        builder.Connect(
+            self.plant.get_state_output_port(self._robot),
+            select.get_input_port(),
+        )
+        builder.ExportOutput(
+            select.get_output_port(), "affetto.estimated_state"
+        )
+        return select.get_output_port()
+
+    def _add_teacher(
+        self, builder: DiagramBuilder, mouse: Meshcat | None
+    ) -> None:
+        teaching = self.scenario.teaching
+        if mouse is not None:
+            self.mouse_teacher = MouseTeacher.AddToBuilder(
+                builder=builder,
+                plant=self.plant,
+                scene_graph=self.scene_graph,
+                meshcat=mouse,
+                config=teaching,
+            )
+            pull = self.mouse_teacher.get_pulling_force_output_port()
+        else:
+            self.teacher = builder.AddNamedSystem(
+                "kinesthetic_teacher",
+                KinestheticTeacher(self.plant, self.joints.names, teaching),
+            )
+            builder.Connect(
+                self._estimated_state,
+                self.teacher.get_estimated_state_input_port(),
+            )
+            builder.Connect(
+                self.teacher.get_spatial_force_output_port(),
+                self.plant.get_applied_spatial_force_input_port(),
+            )
+            pull = self.teacher.get_pulling_force_output_port()
+        builder.ExportOutput(pull, "teacher.pulling_force")
+
+    def _add_actuation(self, builder: DiagramBuilder) -> None:
+        lower, upper = world.joint_limits(self.plant, self.joints.names)
+        config = self.scenario.pneumatics
+        config.time_step = self.scenario.plant_config.time_step
+        self.actuation = PneumaticActuation.AddToBuilder(
+            builder=builder,
+            config=config,
+            joint_names=self.joints.names,
+            q_lower=lower,
+            q_upper=upper,
+        )
+        builder.Connect(
+            self._estimated_state,
+            self.actuation.get_estimated_state_input_port(),
+        )
+        spread = builder.AddNamedSystem(
+            "joint_actuation", MatrixGain(D=self.joints.actuation_matrix)
+        )
+        builder.Connect(
+            self.actuation.get_actuation_output_port(),
+            spread.get_input_port(),
+        )
+        builder.Connect(
+            spread.get_output_port(),
+            self.plant.get_actuation_input_port(self._robot),
+        )
+        for name in ("actuation", "chamber_pressure", "mass_flow"):
+            builder.ExportOutput(
+                self.actuation.GetOutputPort(name), f"affetto.{name}"
+            )
+
+    def _add_sight(self, builder: DiagramBuilder) -> None:
+        # The renderers stand in a copy of the scene: a SceneGraph hands each
+        # new pose to all its render engines, which would triple the cost of
+        # every physics step. The copy is only asked when an image is.
+        seen = self.scene_graph.Clone()
+        seen.set_name("seen_scene")
+        builder.AddSystem(seen)
+        builder.Connect(
+            self.plant.get_geometry_pose_output_port(),
+            seen.get_source_pose_port(self.plant.get_source_id()),
+        )
+        self.camera = MirrorCamera.AddToBuilder(
+            builder=builder,
+            plant=self.plant,
+            scene_graph=seen,
+            config=self.scenario.camera,
+            mirrors=self.scenario.mirrors,
+            render_config=self.scenario.rendering,
+        )
+        self.blob_sensor: BlobSensor | AnalyticBlobSensor
+        if self.scenario.camera.renderer == "analytic":
+            self.blob_sensor = AnalyticBlobSensor.AddToBuilder(
+                builder=builder,
+                plant=self.plant,
+                query_object=seen.get_query_output_port(),
+                camera=self.camera,
+                config=self.scenario.blob,
+                radius=marker_radius(self.plant, seen.model_inspector()),
+            )
+        else:
+            self.blob_sensor = BlobSensor.AddToBuilder(
+                builder=builder,
+                color_image=self.camera.get_color_image_output_port(),
+                config=self.scenario.blob,
+            )
+        for system, names in (
+            (self.camera, ("color_image", "label_image")),
+            (self.blob_sensor, ("blob", "blob_pixels")),
+        ):
+            for name in names:
+                builder.ExportOutput(
+                    system.GetOutputPort(name), f"camera.{name}"
+                )
+
+    def _add_hearing(self, builder: DiagramBuilder) -> None:
+        self.microphone = DrumMicrophone.AddToBuilder(
+            builder=builder, plant=self.plant
+        )
+        for name in ("contact_force", "knock_force"):
+            builder.ExportOutput(
+                self.microphone.GetOutputPort(name), f"drum.{name}"
+            )
+
+    def _add_motion(self, builder: DiagramBuilder) -> OutputPort:
+        """Adds what moves the robot; returns [q; q̇] desired."""
+        n = self.num_joints
+        if self.scenario.motion_source == "external":
+            desired = builder.AddNamedSystem(
+                "desired_state", PassThrough(2 * n)
+            )
+            builder.ExportInput(
+                desired.get_input_port(), "affetto.desired_state"
+            )
+            return desired.get_output_port()
+
+        self.gaze = GazeServo.AddToBuilder(
+            builder=builder,
+            blob=self.blob_sensor.get_blob_output_port(),
+            estimated_state=self._estimated_state,
+            yaw_index=self._yaw,
+            view=gaze_view(
+                self.camera.camera_model, self.scenario.blob.calibration
+            ),
+            config=self.scenario.gaze,
+            rate=self.scenario.camera.rate,
+            latency=self.scenario.camera.latency,
+        )
+        dmp = Dmp(self.scenario.dmp)
+        self.policy = SkillPolicy.AddToBuilder(
+            builder=builder,
+            num_parameters=n * dmp.n_basis,
+            config=self.scenario.policy,
+        )
+        self.dmp_source = DmpSource.AddToBuilder(
+            builder=builder, dmp=dmp, num_joints=n
+        )
+        builder.Connect(
+            self.gaze.get_task_parameter_output_port(),
+            self.policy.get_task_parameter_input_port(),
+        )
+        builder.Connect(
+            self.gaze.get_ready_output_port(),
+            self.policy.get_settled_input_port(),
+        )
+        builder.Connect(
+            self.policy.get_policy_parameters_output_port(),
+            self.dmp_source.get_policy_parameters_input_port(),
+        )
+        builder.Connect(
+            self.policy.get_start_time_output_port(),
+            self.dmp_source.get_start_time_input_port(),
+        )
+        # The gaze turns the yaw away from where the movement has it; once it
+        # is done it returns, and what is left is the movement.
+        turn = np.zeros((2 * n, 1))
+        turn[self._yaw] = 1.0
+        spread = builder.AddNamedSystem("gaze_turn", MatrixGain(D=turn))
+        straight = builder.AddNamedSystem(
+            "gaze_straight",
+            ConstantVectorSource(-turn[:, 0] * self.start_posture[self._yaw]),
+        )
+        total = builder.AddNamedSystem("desired_state", Adder(3, 2 * n))
+        builder.Connect(
+            self.gaze.get_yaw_command_output_port(), spread.get_input_port()
+        )
+        for i, port in enumerate(
+            (
+                self.dmp_source.get_desired_state_output_port(),
+                spread.get_output_port(),
+                straight.get_output_port(),
+            )
+        ):
+            builder.Connect(port, total.get_input_port(i))
+        for system, names in (
+            (self.policy, ("policy_parameters", "start_time")),
+            (self.gaze, ("task_parameter", "settled")),
+        ):
+            for name in names:
+                builder.ExportOutput(
+                    system.GetOutputPort(name), f"affetto.{name}"
+                )
+        return total.get_output_port()
+
+    def _add_control(
+        self, builder: DiagramBuilder, desired: OutputPort
+    ) -> None:
+        builder.ExportOutput(desired, "affetto.desired_state")
+        command = self.actuation.get_command_input_port()
+        if self.scenario.valve_source == "external":
+            builder.ExportInput(command, f"affetto.{command.get_name()}")
+            return
+        self.controller = PidfController.AddToBuilder(
+            builder=builder,
+            config=self.scenario.control,
+            joint_names=self.joints.names,
+        )
+        self._offset = builder.AddNamedSystem(
+            "equilibrium_offset",
+            ConstantVectorSource(np.zeros(self.num_joints)),
+        )
+        for source, port in (
+            (desired, "desired_state"),
+            (self._estimated_state, "estimated_state"),
+            (
+                self.actuation.get_chamber_pressure_output_port(),
+                "chamber_pressure",
+            ),
+            (self._offset.get_output_port(), "equilibrium_offset"),
+        ):
+            builder.Connect(source, self.controller.GetInputPort(port))
+        builder.Connect(
+            self.controller.get_valve_opening_output_port(), command
+        )
+        for name in ("valve_opening", "pid_output"):
+            builder.ExportOutput(
+                self.controller.GetOutputPort(name), f"affetto.{name}"
+            )
+
+    def set_equilibrium_offset(
+        self, context: Context, offset: Sequence[float] | np.ndarray
+    ) -> None:
+        """Sets the offset (n,), Pa, that is added to u_PID (paper Eq. 8)."""
+        value = self._offset.get_mutable_source_value(
+            self._sub(self._offset, context)
+        )
+        value.SetFromVector(np.asarray(offset, float))

@@ -1,1 +1,0 @@
-"""What runs many trials and gathers their results."""

@@ -1,0 +1,1 @@
+"""Searches the gains of the controllers on the whole robot."""

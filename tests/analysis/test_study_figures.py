@@ -1,0 +1,115 @@
+"""The scripts that draw the studies' figures, on what a fake world gives."""
+
+import importlib.util
+import json
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+from drake_affetto.cli import study as campaign
+from drake_affetto.common.output import write_json
+from drake_affetto.experiments.drumming import DrumPlan, run_drum
+from drake_affetto.experiments.mirror import MirrorPlan, run_mirror
+from drake_affetto.runner.executor import TrialExecutor
+from drake_affetto.runner.store import TrialStore
+from support import fake_world
+
+ANALYSIS = Path(__file__).parents[2] / "analysis"
+
+
+def run(script, *words):
+    return subprocess.run(
+        [sys.executable, str(ANALYSIS / script), *map(str, words)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        cwd=ANALYSIS.parent,
+    )
+
+
+@pytest.fixture(scope="module")
+def studies(tmp_path_factory):
+    """Folders of a drum, a mirror and an all-scenarios study."""
+    root = tmp_path_factory.mktemp("studies")
+    with (
+        TrialStore(root / "t.sqlite") as store,
+        TrialExecutor(fake_world.run, store, workers=0, quiet=True) as executor,
+    ):
+        drum = run_drum(
+            executor,
+            DrumPlan(demonstrations=5, evaluations=4, repeats=2, active=True),
+        )
+        plan = MirrorPlan(
+            scenario="mirror_and_camera",
+            repeats=2,
+            evaluations=3,
+            demonstrations=6,
+        )
+        mirror = run_mirror(executor, plan).results
+    every = {
+        "study": "scenarios",
+        "version": mirror["version"],
+        "seed": 0,
+        "scenarios": {"mirror": mirror, "camera_rolled": mirror},
+    }
+    for name, results in {
+        "drum": drum,
+        "mirror": mirror,
+        "scenarios": every,
+    }.items():
+        (root / name).mkdir()
+        write_json(root / name / "results.json", results)
+    return root
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("script", "study"),
+    [
+        ("fig3_drumming", "drum"),
+        ("fig5_mirror_transfer", "mirror"),
+        ("fig5_mirror_transfer", "scenarios"),
+    ],
+)
+def test_figures_are_drawn(studies, tmp_path, script, study):
+    done = run(f"{script}.py", "--results", studies / study, "--out", tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / f"{script}.png").stat().st_size > 20_000
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("script", ["fig3_drumming", "fig5_mirror_transfer"])
+def test_what_is_not_a_study_is_told(tmp_path, script):
+    done = run(f"{script}.py", "--results", tmp_path, "--out", tmp_path)
+    assert done.returncode == 2
+    assert "no such file" in done.stderr
+    (tmp_path / "results.json").write_text('{"study": "toy"}')
+    done = run(f"{script}.py", "--results", tmp_path, "--out", tmp_path)
+    assert done.returncode == 2
+    assert "results.json" in done.stderr
+
+
+def test_conditions_are_changed_one_at_a_time(tmp_path, monkeypatch):
+    spec = importlib.util.spec_from_file_location(
+        "when_transfer_wins", ANALYSIS / "when_transfer_wins.py"
+    )
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    monkeypatch.setattr(campaign, "run_task", fake_world.run)
+    words = "--samples 3 4 --repeats 1 --evaluations 2 --demonstrations 4"
+    monkeypatch.setattr(
+        sys,
+        "argv",
+        ["x", *words.split(), "--workers", "0", "--out", str(tmp_path)],
+    )
+    assert script.main() == 0
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert results["study"] == "conditions"
+    rows = results["conditions"]
+    assert len(rows) == len(script.CONDITIONS) * len(script.SCHEMES) * 2
+    assert {(row["factor"], row["value"]) for row in rows} == set(
+        script.CONDITIONS
+    )
+    assert (tmp_path / "when_transfer_wins.png").stat().st_size > 20_000

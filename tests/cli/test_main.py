@@ -1,0 +1,153 @@
+import importlib
+import os
+import subprocess
+import sys
+import types
+
+import pytest
+
+from drake_affetto import __version__
+from drake_affetto.cli import main as cli
+from drake_affetto.common.errors import InputError
+
+
+@pytest.fixture
+def command(monkeypatch):
+    """Registers a function as the command `probe`, and says what it got."""
+
+    def register(run):
+        def add_arguments(parser):
+            parser.add_argument("--number", type=int, default=0)
+
+        module = types.ModuleType("drake_affetto.cli.probe")
+        vars(module).update(add_arguments=add_arguments, run=run)
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+        monkeypatch.setitem(cli.COMMANDS, "probe", "probe it")
+
+    return register
+
+
+def test_help_lists_the_commands_and_imports_nothing_heavy():
+    code = (
+        "import sys; from drake_affetto.cli import main as cli;"
+        "code = cli.main(['-h']);"
+        "heavy = {'numpy', 'scipy', 'pydrake', 'cv2', 'numba', 'rich'};"
+        "print(sorted(heavy & set(sys.modules)), file=sys.stderr);"
+        "sys.exit(code)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True
+    )
+    assert (done.returncode, done.stderr) == (0, "[]\n")
+    for name, summary in cli.COMMANDS.items():
+        assert name in done.stdout
+        assert summary.split()[0] in done.stdout
+
+
+@pytest.mark.parametrize("name", list(cli.COMMANDS))
+def test_every_command_keeps_the_convention(name, capsys):
+    module = importlib.import_module(f"drake_affetto.cli.{name}")
+    assert callable(module.add_arguments)
+    assert callable(module.run)
+    assert cli.main([name, "--help"]) == 0
+    assert f"affetto {name}" in capsys.readouterr().out
+
+
+def test_version():
+    done = subprocess.run(
+        [sys.executable, "-m", "drake_affetto.cli", "--version"],
+        capture_output=True,
+        text=True,
+    )
+    assert (done.returncode, done.stdout) == (0, f"affetto {__version__}\n")
+
+
+def test_arguments_reach_the_command_and_its_code_the_caller(command, capsys):
+    command(lambda args: args.number)
+    assert cli.main(["probe", "--number", "7"]) == 7
+    assert cli.main(["probe"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        ([], "COMMAND"),
+        (["drumm"], "drumm"),
+        (["--verbose"], "COMMAND"),
+        (["probe", "--number", "many"], "many"),
+        (["probe", "--num", "3"], "--num"),
+        (["probe", "extra"], "extra"),
+    ],
+)
+def test_wrong_words_are_one_line_and_exit_2(command, capsys, words, named):
+    command(lambda args: 0)
+    assert cli.main(words) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("affetto: error: ")
+    assert named in err
+    assert err.count("\n") == 1
+    assert err.endswith("\n")
+
+
+def test_input_error_is_one_line_and_exit_2(command, capsys):
+    def run(args):
+        raise InputError("control.gain is -1,\n  expected a positive number")
+
+    command(run)
+    assert cli.main(["probe"]) == 2
+    assert capsys.readouterr() == (
+        "",
+        "affetto: error: control.gain is -1, expected a positive number\n",
+    )
+
+
+def test_other_errors_keep_their_trace(command):
+    def run(args):
+        raise ValueError("a fault of the program")
+
+    command(run)
+    with pytest.raises(ValueError, match="a fault"):
+        cli.main(["probe"])
+
+
+def test_interrupt_is_one_line_and_exit_130(command, capsys):
+    def run(args):
+        raise KeyboardInterrupt
+
+    command(run)
+    assert cli.main(["probe"]) == 130
+    assert capsys.readouterr().err == "affetto: interrupted\n"
+
+
+@pytest.mark.parametrize("buffered", [True, False])
+def test_reader_of_the_pipe_may_leave(buffered):
+    code = (
+        "import sys, types; from drake_affetto.cli import main as cli;"
+        "probe = types.ModuleType('drake_affetto.cli.probe');"
+        "probe.add_arguments = lambda parser: None;"
+        "probe.run = lambda args: print('a line');"
+        "sys.modules[probe.__name__] = probe;"
+        "cli.COMMANDS['probe'] = 'probe it';"
+        "sys.exit(cli.main(['probe']))"
+    )
+    environment = {
+        key: value
+        for key, value in os.environ.items()
+        if key != "PYTHONUNBUFFERED"
+    }
+    if not buffered:
+        environment["PYTHONUNBUFFERED"] = "1"
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            stdout=write,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=environment,
+        )
+    finally:
+        os.close(write)
+    assert (done.returncode, done.stderr) == (141, "")

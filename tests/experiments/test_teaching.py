@@ -1,0 +1,296 @@
+"""Teaching many places into a file: order, resuming, refusals."""
+
+import io
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from drake_affetto.cli import main as cli
+from drake_affetto.cli.teach import print_taught
+from drake_affetto.common.errors import InputError
+from drake_affetto.experiments import trials as tasks
+from drake_affetto.experiments.teaching import Course, Taught, teach
+from drake_affetto.runner.store import TrialStore
+from drake_affetto.teaching.demonstrations import (
+    Demonstration,
+    append_demonstration,
+    read_demonstrations,
+)
+
+
+def fake_trial(spec):
+    """What a trial gives, without the robot; every fourth never sounds."""
+    rng = np.random.default_rng(spec["seed"])
+    success = spec["seed"] % 4 != 3
+    result = {
+        "found": True,
+        "tau": rng.normal(size=2).tolist(),
+        "attempts": 1 + spec["seed"] % 2 if success else 4,
+        "success": success,
+        "reward": rng.uniform(0.3, 0.8) if success else 0.05,
+        "max_pull": rng.uniform(15, 25),
+    }
+    arrays = {
+        "theta": rng.normal(size=120),
+        "q": rng.normal(size=(300, 8)),
+        "prototype": rng.uniform(size=(20, 25)),
+    }
+    return result, arrays
+
+
+@pytest.fixture
+def trials(monkeypatch):
+    """Replaces the robot; the seeds that were taught with are in the list."""
+    ran = []
+
+    def run(spec):
+        ran.append(spec["seed"])
+        return fake_trial(spec)
+
+    monkeypatch.setattr(tasks, "run_task", run)
+    return ran
+
+
+def course(path, count=6, *, scenario="drumming", seed=0):
+    return Course(scenario, count, seed, path)
+
+
+def test_what_sounded_is_in_the_file_and_the_rest_is_told(tmp_path, trials):
+    path = tmp_path / "deep" / "taught.h5"
+    taught = teach(course(path), workers=0)
+    assert [each.success for each in taught] == [True] * 3 + [False] + [
+        True
+    ] * 2
+    assert [each.attempts for each in taught] == [1, 2, 1, 4, 1, 2]
+    found = read_demonstrations(path)
+    assert [each.seed for each in found] == [0, 1, 2, 4, 5]
+    positions = course(path).positions
+    for each in found:
+        np.testing.assert_array_equal(each.drum_xy, positions[each.seed])
+        assert each.attempt == each.seed % 2
+        assert (each.scenario, each.teacher) == ("drumming", "simulated")
+        assert each.t[-1] == 3.0
+        np.testing.assert_allclose(np.diff(each.t), 0.01)
+        assert each.theta.shape == (120,)
+        assert each.task_parameter.shape == (2,)
+    buffer = io.StringIO()
+    print_taught(taught, Console(file=buffer, width=100))
+    told = buffer.getvalue()
+    assert "5 of 6 positions taught, 3 (50%) at first try" in told
+    assert told.count("no sound") == 1
+
+
+def test_going_on_repeats_nothing_and_ends_in_the_same_file(tmp_path, trials):
+    whole, parts = tmp_path / "whole.h5", tmp_path / "parts.h5"
+    expected = teach(course(whole, 10), workers=0)
+    trials.clear()
+    teach(course(parts, 3), workers=0)
+    # All of it is in the file: nothing else is left.
+    assert set(os.listdir(tmp_path)) == {
+        "whole.h5",
+        "whole.h5.trials.sqlite",
+        "parts.h5",
+    }
+    teach(course(parts, 7), workers=0)
+    taught = teach(course(parts, 10), workers=0)
+    assert trials == list(range(10))
+    assert parts.read_bytes() == whole.read_bytes()
+    for a, b in zip(taught, expected, strict=True):
+        np.testing.assert_array_equal(a.xy, b.xy)
+        assert (a.attempts, a.success, a.reward, a.max_pull) == (
+            b.attempts,
+            b.success,
+            b.reward,
+            b.max_pull,
+        )
+    # Fewer than there are: the file stays as it is.
+    assert len(teach(course(parts, 2), workers=0)) == 2
+    assert parts.read_bytes() == whole.read_bytes()
+
+
+def test_order_is_the_plans_whoever_finishes_first(tmp_path, trials):
+    path = tmp_path / "taught.h5"
+    # A run that was killed while the first position took long.
+    positions = course(path).positions
+    with TrialStore(f"{path}.trials.sqlite") as store:
+        for i in (2, 1, 3):
+            spec = tasks.demonstration("drumming", positions[i].tolist(), i)
+            store.put(spec, *fake_trial(spec))
+    teach(course(path), workers=0)
+    assert trials == [0, 4, 5]
+    assert [d.seed for d in read_demonstrations(path)] == [0, 1, 2, 4, 5]
+
+
+def test_ctrl_c_says_how_to_go_on(tmp_path, monkeypatch, capsys):
+    def run(spec):
+        if spec["seed"] == 2:
+            raise KeyboardInterrupt
+        return fake_trial(spec)
+
+    monkeypatch.setattr(tasks, "run_task", run)
+    path = tmp_path / "t.h5"
+    words = ["teach", "--out", str(path), "--positions", "5"]
+    assert cli.main([*words, "--workers", "0"]) == 130
+    told = " ".join(capsys.readouterr().out.split())
+    assert "2 of 5 positions are in" in told
+    assert "the same command goes on from there" in told
+    assert [d.seed for d in read_demonstrations(path)] == [0, 1]
+
+
+_SLOW_COMMAND = """
+import sys, time
+sys.path.insert(0, sys.argv[1])
+import test_teaching
+from drake_affetto.cli import main as cli
+from drake_affetto.experiments import trials as tasks
+
+def run(spec):
+    time.sleep(0.1)
+    return test_teaching.fake_trial(spec)
+
+tasks.run_task = run
+sys.exit(cli.main(["teach", "--workers", "0", "--positions", "40",
+                   "--out", sys.argv[2]]))
+"""
+
+
+@pytest.mark.slow
+def test_a_kill_loses_at_most_the_one_in_progress(tmp_path, trials):
+    path = tmp_path / "taught.h5"
+    process = subprocess.Popen(
+        [
+            sys.executable,
+            "-c",
+            textwrap.dedent(_SLOW_COMMAND),
+            str(Path(__file__).parent),
+            str(path),
+        ],
+        stdout=subprocess.DEVNULL,
+    )
+    try:
+        end = time.monotonic() + 60
+        while not path.exists() or len(read_demonstrations(path)) < 3:
+            assert time.monotonic() < end
+            assert process.poll() is None
+            time.sleep(0.02)
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    there = len(read_demonstrations(path))
+    assert 3 <= there < 30
+    taught = teach(course(path, 40), workers=0)
+    # The killed run may have finished one that had not come into the file;
+    # the fourth one never sounds and is in the store.
+    assert 40 - len(trials) - there in (0, 1, 2)
+    assert len(trials) == len(set(trials))
+    assert [each.success for each in taught] == [i % 4 != 3 for i in range(40)]
+    undisturbed = tmp_path / "undisturbed.h5"
+    teach(course(undisturbed, 40), workers=0)
+    assert path.read_bytes() == undisturbed.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"scenario": "mirror"}, "scenario drumming, not mirror"),
+        ({"seed": 1}, "seed 0, not 1"),
+    ],
+)
+def test_a_file_of_another_course_is_refused(
+    tmp_path, trials, changes, message
+):
+    path = tmp_path / "taught.h5"
+    teach(course(path, 2), workers=0)
+    before = path.read_bytes()
+    with pytest.raises(InputError, match=message):
+        course(path, 2, **changes)
+    assert path.read_bytes() == before
+
+
+def test_files_of_others_are_refused(tmp_path, monkeypatch):
+    path = tmp_path / "taught.h5"
+
+    def holds(**changes):
+        path.unlink(missing_ok=True)
+        values = {
+            "t": [0.0, 1.0],
+            "q": np.zeros((2, 1)),
+            "joint_names": ["waist_yaw"],
+            "drum_xy": [0.2, -0.1],
+            "scenario": "drumming",
+            "seed": 0,
+        }
+        append_demonstration(path, Demonstration(**{**values, **changes}))
+
+    holds(version="0.0.0")
+    with pytest.raises(InputError, match=r"version 0\.0\.0, not"):
+        course(path)
+    holds(seed=None)
+    with pytest.raises(InputError, match="seed None, not 0"):
+        course(path)
+    holds()
+    with pytest.raises(InputError, match="other places"):
+        course(path)
+    path.write_text("t, q0\n")
+    with pytest.raises(InputError, match="no HDF5 file"):
+        course(path)
+    with pytest.raises(InputError, match="not a folder"):
+        course(tmp_path)
+
+
+def test_a_robot_that_does_not_move_by_itself_cannot_be_taught(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text("extends: drumming\nmotion_source: external\n")
+    with pytest.raises(InputError, match="motion_source"):
+        course(tmp_path / "t.h5", scenario=str(path))
+
+
+def test_two_at_one_file_are_noticed(tmp_path, trials):
+    path = tmp_path / "taught.h5"
+    one, other = course(path, 2), course(path, 2)
+    teach(one, workers=0)
+    with pytest.raises(InputError, match="somebody else"):
+        teach(other, workers=0)
+
+
+def test_a_drum_that_is_not_seen_is_told_of():
+    buffer = io.StringIO()
+    unseen = Taught(np.zeros(2), False, 0, False, 0.0, 0.0)
+    print_taught([unseen], Console(file=buffer, width=100))
+    assert "drum not seen" in buffer.getvalue()
+    print_taught([], Console(file=buffer, width=100))
+
+
+@pytest.mark.slow
+def test_the_robot_is_taught(tmp_path):
+    mine = tmp_path / "mine.yaml"
+    mine.write_text("extends: drumming\ncamera: {renderer: analytic}\n")
+    path = tmp_path / "taught.h5"
+    done = cli.main(
+        ["teach", "--scenario", str(mine), "--positions", "2"]
+        + ["--workers", "0", "--seed", "3", "--out", str(path)]
+    )
+    assert done == 0
+    found = read_demonstrations(path)
+    assert len(found) == 2
+    trials = tasks.runner(str(mine))
+    threshold = trials.reward_config.threshold
+    for each in found:
+        assert each.reward > threshold
+        assert 1.0 < each.max_pull <= trials.scenario.teaching.max_force + 1e-9
+        assert each.joint_names == tuple(trials.scenario.active_joints)
+        # Times and angles are those from which the movement was encoded.
+        np.testing.assert_allclose(
+            trials.dmp.encode(each.t, each.q), each.theta, atol=1e-8
+        )
+        # And the movement strikes the drum where it stood.
+        recording = trials.play(each.drum_xy, each.theta, 0)
+        assert trials.reward(recording, trials.taps()) > threshold

@@ -1,0 +1,138 @@
+"""The toy experiment: its data, its resumption, its results."""
+
+import argparse
+import json
+import math
+
+import numpy as np
+from numpy.testing import assert_allclose
+import pytest
+
+from drake_affetto.cli import toy as command
+from drake_affetto.common.errors import InputError
+from drake_affetto.experiments import toy
+
+
+def arguments(*words):
+    parser = argparse.ArgumentParser()
+    command.add_arguments(parser)
+    return parser.parse_args(words)
+
+
+def test_function():
+    assert_allclose(
+        toy.toy_function(np.array([[0.0, 0.0], [1.0, 1.0], [0.5, -1.0]])),
+        [2.0, 6.0 + 2.0 * math.e, 0.25 - 4.0 + 2.0 * math.exp(-0.5)],
+    )
+
+
+@pytest.mark.parametrize("name", toy.DOMAINS)
+def test_problem(name):
+    domain = toy.DOMAINS[name]
+    problem = toy.make_problem(domain, seed=3)
+    for X in (problem.X, problem.X_test, problem.Z):
+        assert domain.low <= X.min()
+        assert X.max() <= domain.high
+    # Half a turn and back.
+    assert_allclose(problem.X_target @ toy.TURN, problem.Z)
+    assert_allclose(problem.y_target, toy.toy_function(problem.Z))
+    assert problem.source.n_samples_seen_ == domain.n_source
+    again = toy.make_problem(domain, seed=3)
+    assert np.array_equal(again.source.coef_, problem.source.coef_)
+    other = toy.make_problem(domain, seed=4)
+    assert not np.array_equal(other.X, problem.X)
+
+
+def test_subsets():
+    domain = toy.DOMAINS["unit"]
+    chosen = [toy.subset(domain, 0, k) for k in range(20)]
+    assert all(c.sum() == domain.n_labelled for c in chosen)
+    assert len({tuple(c) for c in chosen}) == 20
+
+
+def test_transfers_beat_what_they_should():
+    """In small: the order of the methods, not the figures."""
+    trials = [toy.run_seed(spec) for spec in toy.plan("unit", 3, 50, 6)]
+    figures = toy.gather(trials)
+    assert figures["source"]["train_mse"] < 0.01
+    assert figures["source"]["test_mse"] < 0.2
+    assert 10.0 < figures["source"]["rotated_mse"] < 200.0
+    error = {
+        name: row["other_mse_mean"]
+        for group in ("transfer", "baselines")
+        for name, row in figures[group].items()
+    }
+    assert error["default"] < 0.5 * error["several_starts"]
+    assert error["several_starts"] < error["paper_single_start"]
+    assert error["unlabelled"] < 0.1
+    assert error["true_map"] < error["default"] < error["affine_regression"]
+    assert error["unchanged"] > 10.0
+    spread = figures["transfer"]["default"]["per_seed"]["other_mse_mean"]
+    assert len(spread) == 3
+    assert error["default"] == np.median(spread)
+
+
+def test_run_resumes_and_repeats(tmp_path, capsys):
+    words = ["--repeats", "2", "--workers", "0", "--out"]
+    first, second = tmp_path / "first", tmp_path / "second"
+    assert command.run(arguments("--seeds", "1", *words, str(first))) == 0
+    capsys.readouterr()
+    # One of two seeds is there already.
+    assert command.run(arguments("--seeds", "2", *words, str(first))) == 0
+    assert "2 seeds were finished already" in capsys.readouterr().out
+    assert command.run(arguments("--seeds", "2", *words, str(second))) == 0
+    results = [(d / "results.json").read_bytes() for d in (first, second)]
+    assert results[0] == results[1]
+
+
+def test_results(tmp_path, capsys):
+    command.run(
+        arguments(
+            *("--repeats", "2", "--seeds", "2", "--seed", "7"),
+            *("--workers", "0", "--out", str(tmp_path)),
+        )
+    )
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert results["seed"] == 7
+    assert results["repeats"] == 2
+    for figures in (results, results["wide"]):
+        assert {"train_mse", "test_mse", "rotated_mse"} <= set(
+            figures["source"]
+        )
+        assert {"paper_single_start", "default"} <= set(figures["transfer"])
+        assert {"relearn", "gaussian_process", "affine_regression"} <= set(
+            figures["baselines"]
+        )
+        for group in ("transfer", "baselines"):
+            for row in figures[group].values():
+                for key in ("train_mse", "other_mse"):
+                    for kind in ("mean", "std"):
+                        value = row[f"{key}_{kind}"]
+                        seeds = row["per_seed"][f"{key}_{kind}"]
+                        assert value == np.median(seeds)
+                        assert len(seeds) == 2
+    printed = capsys.readouterr().out
+    assert "41.71" in printed
+    assert "linear regression" in printed
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--repeats", "0"], "--repeats"),
+        (["--seeds", "0"], "--seeds"),
+        (["--seed", "-1"], "--seed"),
+        (["--workers", "-1"], "--workers"),
+    ],
+)
+def test_bad_options_are_named(tmp_path, words, named):
+    with pytest.raises(InputError, match=named):
+        command.run(arguments(*words, "--out", str(tmp_path / "out")))
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    with pytest.raises(InputError, match="file"):
+        command.run(arguments("--out", str(blocked)))

@@ -1,0 +1,125 @@
+"""Maps from changed views to the first one."""
+
+import numpy as np
+import pytest
+
+from drake_affetto.experiments.view_maps import (
+    CHANGED_VIEWS,
+    REFERENCE,
+    CalibrationError,
+    View,
+    fit_affine,
+    fit_optical,
+    fit_projective,
+    fit_quadratic,
+    learn_from_few,
+    make_optical_map,
+    measure_true_map,
+    measurement_noise,
+    places_of,
+    with_error,
+)
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return View.of(REFERENCE)
+
+
+@pytest.fixture(scope="module")
+def mirror(reference):
+    return measure_true_map(View.of("mirror"), reference, n=6)
+
+
+def some(n=30, seed=0):
+    return np.random.default_rng(seed).uniform(-1, 1, (n, 2))
+
+
+def test_each_fit_finds_a_map_of_its_kind():
+    X, Z = some(), some(seed=1)
+    H, c = np.array([[1.0, 0.4], [-0.3, 2.0]]), np.array([0.2, -1.0])
+
+    def affine(X):
+        return X @ H.T + c
+
+    def projective(X):
+        return affine(X) / (1 + X @ [0.2, -0.1])[:, None]
+
+    def quadratic(X):
+        return affine(X) + np.stack([X[:, 0] ** 2, X[:, 0] * X[:, 1]], -1)
+
+    for true, fits, others in (
+        (affine, (fit_affine, fit_projective, fit_quadratic), ()),
+        (projective, (fit_projective,), (fit_affine,)),
+        (quadratic, (fit_quadratic,), (fit_affine, fit_projective)),
+    ):
+        for fit in fits:
+            predicted = fit(X, true(X)).predict(Z)
+            np.testing.assert_allclose(predicted, true(Z), atol=1e-5)
+        for fit in others:
+            predicted = fit(X, true(X)).predict(Z)
+            assert np.abs(predicted - true(Z)).max() > 0.01
+
+
+@pytest.mark.parametrize("name", CHANGED_VIEWS)
+def test_each_changed_view_sees_all_of_its_region(name, reference):
+    view = View.of(name)
+    true = measure_true_map(view, reference, n=3)
+    assert len(true.target) == 9
+    corners = view.sight.positions[[0, 8, 40, 72, 80]]
+    # Rendered and geometric pixels agree: nothing hides the marker.
+    assert np.all(view.rendered_error(corners) < 0.5)
+
+
+def test_a_moved_robot_changes_nothing_as_its_camera_moves_along(reference):
+    true = measure_true_map(View.of("robot_moved"), reference, n=4)
+    np.testing.assert_allclose(true.target, true.source, atol=1e-6)
+
+
+def test_places_are_those_of_the_drum(reference):
+    xy = reference.sight.positions[::7]
+    tau = reference.task_parameters(xy)
+    # The centroid is not quite the centre: a millimetre.
+    np.testing.assert_allclose(places_of(reference, tau), xy, atol=3e-3)
+
+
+def test_the_optical_map_explains_the_mirror_and_the_affine_does_not(mirror):
+    optical = make_optical_map(mirror.view, mirror.reference)
+    noise = measurement_noise(mirror.reference)
+    few = [0, 5, 17, 30]
+    X, Y = mirror.target[few], mirror.source[few]
+    fit = fit_optical(X, Y, optical, noise)
+    assert mirror.distance(fit.predict(mirror.target)).max() < 0.003
+    affine = fit_affine(mirror.target, mirror.source)
+    assert mirror.distance(affine.predict(mirror.target)).max() > 0.01
+
+
+def test_more_samples_are_no_worse_and_the_same_seed_gives_the_same(mirror):
+    noise = measurement_noise(mirror.view), measurement_noise(mirror.reference)
+    curves = [
+        learn_from_few(
+            mirror,
+            lambda X, Y, rng: fit_affine(X, Y),
+            "affine",
+            [3, 12],
+            15,
+            noise,
+        )
+        for _ in range(2)
+    ]
+    np.testing.assert_array_equal(curves[0].errors, curves[1].errors)
+    few, many = np.median(curves[0].errors, axis=1)
+    assert many < few
+
+
+def test_a_wrong_camera_is_wrong_by_as_much_as_is_said(reference):
+    model = reference.sight.model
+    error = CalibrationError(focal=0.01, angle=0.02, position=0.005)
+    wrong = with_error(model, error, np.random.default_rng(0))
+    assert abs(wrong.camera.focal_x / model.camera.focal_x - 1) == (
+        pytest.approx(0.01)
+    )
+    X = np.linalg.inv(model.X_AC) @ wrong.X_AC
+    angle = np.arccos((np.trace(X[:3, :3]) - 1) / 2)
+    assert angle == pytest.approx(0.02, rel=0.02)
+    assert np.linalg.norm(X[:3, 3]) == pytest.approx(0.005)

@@ -1,0 +1,162 @@
+"""The geometry of seeing, on a chain of joints and against projections."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+from drake_affetto.common.errors import InputError
+from drake_affetto.geometry import optics
+from drake_affetto.geometry.kinematics import SerialChain
+from drake_affetto.perception.blob import BlobCalibration
+from drake_affetto.perception.camera_model import Mirror, SightModel
+from drake_affetto.perception.config import rotation_matrix
+from drake_affetto.perception.plant_camera_model import calibrate_view
+from support.trunk_camera import FISHEYE, HEIGHT, MIRROR, PINHOLE, make
+
+
+def test_a_chain_is_taken_apart_at_the_yaw_joint():
+    rng = np.random.default_rng(0)
+    n = 4
+    axes = np.array([[0, 0, 1], [0, 1, 0], [1, 0, 0], [0, 0, 1]], float)
+    X_PJ = np.array(
+        [
+            optics.make_pose(
+                rotation_matrix(rng.uniform(-1, 1, 3)),
+                rng.uniform(-0.1, 0.1, 3),
+            )
+            for _ in range(n)
+        ]
+    )
+    X_JT = optics.make_pose(rotation_matrix([0.3, 0.1, 0.2]), [0.1, 0, 0])
+    names = ("a", "b", "c", "d")
+    chain = SerialChain(names, X_PJ, axes, X_JT, -np.ones(n), 2 * np.ones(n))
+    angles = {"a": 0.2, "b": -0.4, "c": 0.3, "d": 0.9}
+    X_FC = optics.make_pose(rotation_matrix([0, 0, 0.5]), [0, 0.02, 0])
+    for yaw_joint in names:
+        sight = SightModel.from_chain(
+            PINHOLE, chain, yaw_joint, angles, HEIGHT, 0.03, X_FC
+        )
+        for yaw in (-0.5, 0.0, 0.7):
+            q = chain.posture(angles | {yaw_joint: yaw})
+            np.testing.assert_allclose(
+                sight.camera_pose(yaw), chain.pose(q) @ X_FC, atol=1e-12
+            )
+        assert (sight.yaw_min, sight.yaw_max) == (-1.0, 2.0)
+
+
+@pytest.mark.parametrize("camera", [PINHOLE, FISHEYE])
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(
+    st.floats(0.2, 0.4),
+    st.floats(-0.25, 0.25),
+    st.floats(-0.4, 0.4),
+    st.floats(-0.15, 0.15),
+)
+def test_the_centring_yaw_centres(camera, x, y, pan, tilt):
+    sight = make(camera, pan=pan, tilt=tilt)
+    p_W = sight.marker(np.array([x, y]))
+    yaw = float(sight.centring_yaw(p_W))
+    assert np.isfinite(yaw)
+    p_C = optics.transform_points(
+        optics.invert_pose(sight.camera_pose(yaw)), p_W
+    )
+    u = camera.project(p_C)[0]
+    assert u == pytest.approx(camera.image_center[0], abs=1e-6)
+
+
+def test_a_rolled_camera_is_centred_too_by_its_centroid():
+    sight = make(roll=0.3)
+    yaws, pixels = sight.direct_pixels([[0.28, -0.1], [0.3, 0.12]])
+    np.testing.assert_allclose(pixels[:, 0], 159.5, atol=1e-4)
+    # What is centred is the centroid: the centre is a little off.
+    for xy, yaw in zip([[0.28, -0.1], [0.3, 0.12]], yaws, strict=True):
+        centre = sight.image_of(np.array([xy]), yaw)[0]
+        assert 0 < abs(centre[0] - 159.5) < 2
+
+
+def test_direct_task_parameters_are_image_height_and_yaw():
+    sight = make()
+    box = BlobCalibration(-0.5, 319.5, 50.0, 150.0)
+    xy = np.array([[0.25, -0.1], [0.25, 0.0], [0.35, 0.0]])
+    tau = sight.direct_task_parameters(xy, box)
+    yaws, pixels = sight.direct_pixels(xy)
+    np.testing.assert_allclose(tau[:, 1], yaws)
+    np.testing.assert_allclose(tau[:, 0], (pixels[:, 1] - 50) / 100)
+    # Farther left is more yaw; farther away is higher in the image.
+    assert tau[1, 1] > tau[0, 1]
+    assert tau[2, 0] < tau[1, 0]
+
+
+def test_beyond_the_joints_limits_there_is_no_yaw():
+    import dataclasses
+
+    sight = dataclasses.replace(make(), yaw_min=-0.3, yaw_max=0.3)
+    yaws, pixels = sight.direct_pixels([[0.05, 0.4], [0.3, 0.06]])
+    assert np.isnan(yaws[0])
+    assert np.all(np.isnan(pixels[0]))
+    assert np.isfinite(yaws[1])
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(st.floats(0.2, 0.4), st.floats(-0.15, 0.15), st.booleans())
+def test_locate_is_the_inverse_of_seeing(x, y, mirrored):
+    sight = make()
+    yaw = 0.9 if mirrored else 0.0
+    mirror = MIRROR if mirrored else None
+    xy = np.array([[x, y]])
+    uv = sight.image_of(xy, yaw, mirror)
+    if np.any(np.isnan(uv)):
+        return
+    found = sight.locate(uv, yaw, mirror.X_WM if mirror else None)
+    np.testing.assert_allclose(found[0], [x, y, HEIGHT], atol=1e-9)
+
+
+def test_a_marker_is_whole_only_within_image_and_mirror():
+    sight = make()
+    assert sight.view(np.array([0.3, 0.06]), 0.0).whole == 1.0
+    assert sight.view(np.array([0.3, 0.06]), 2.5).whole == 0.0
+    views = [
+        sight.view(np.array([0.3, 0.06]), yaw, MIRROR).whole
+        for yaw in np.linspace(0.0, 1.6, 33)
+    ]
+    assert max(views) == 1.0
+    assert min(views) == 0.0
+    assert any(0.0 < whole < 1.0 for whole in views)
+    small = Mirror(MIRROR.X_WM, 0.01, 0.01)
+    assert sight.view(np.array([0.3, 0.06]), 0.9, small).whole < 1.0
+
+
+def test_seen_by_takes_the_larger_image():
+    sight = make()
+    xy = np.array([0.3, 0.0])
+    assert sight.seen_by(xy, 0.0, [MIRROR])[0] is None
+    best = max(
+        np.linspace(0.3, 1.6, 27),
+        key=lambda yaw: (
+            sight.view(xy, yaw, MIRROR).whole - sight.view(xy, yaw).whole
+        ),
+    )
+    assert sight.seen_by(xy, best, [MIRROR])[0] == 0
+
+
+def test_calibration_holds_what_is_seen():
+    sight = make()
+    grid = np.stack(
+        np.meshgrid(np.linspace(0.22, 0.3, 4), np.linspace(-0.05, 0.1, 4)), -1
+    ).reshape(-1, 2)
+    box = calibrate_view(sight, grid)
+    tau = sight.direct_task_parameters(grid, box)
+    assert box.u_min == -0.5
+    assert box.u_max == 319.5
+    assert tau[:, 0].min() == pytest.approx(0.05 / 1.1, abs=1e-6)
+    assert tau[:, 0].max() == pytest.approx(1 - 0.05 / 1.1, abs=1e-6)
+    fixed = calibrate_view(sight, grid, fixed_yaw=0.0)
+    pixels = sight.fixed_yaw_pixels(grid, 0.0)
+    seen = np.isfinite(pixels[:, 0])
+    assert seen.sum() >= 3
+    image = fixed.normalise(pixels[seen])
+    assert image.min() > 0
+    assert image.max() < 1
+    with pytest.raises(InputError, match="seen at 0 of 16"):
+        calibrate_view(sight, grid, fixed_yaw=3.0)

@@ -1,0 +1,105 @@
+"""Finished trials are kept, found again, and never counted twice."""
+
+import multiprocessing
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from drake_affetto.common.errors import InputError
+from drake_affetto.runner.store import TrialStore, trial_key
+from drake_affetto.skill.elm import ElmRegressor
+
+
+def spec(i=0, **more):
+    return {"kind": "k", "i": i, "seed": 3, **more}
+
+
+def test_a_result_comes_back_as_it_was(tmp_path):
+    arrays = {"theta": np.linspace(0, 1, 7), "empty": np.zeros((0, 3))}
+    with TrialStore(tmp_path / "a.sqlite") as store:
+        assert store.get(spec()) is None
+        store.put(spec(), {"reward": 0.1 + 0.2, "success": True}, arrays)
+    with TrialStore(tmp_path / "a.sqlite") as store:
+        result, back = store.get(spec())
+    assert result == {"reward": 0.1 + 0.2, "success": True}
+    assert set(back) == set(arrays)
+    for name, array in arrays.items():
+        np.testing.assert_array_equal(back[name], array)
+
+
+def test_the_key_holds_everything_that_determines_a_trial():
+    X, y = np.random.default_rng(0).normal(size=(2, 6, 2))
+    fitted = ElmRegressor(n_hidden=5, random_state=0).fit(X, y)
+    again = ElmRegressor(n_hidden=5, random_state=0).fit(X, y)
+    other = ElmRegressor(n_hidden=5, random_state=0).fit(X, y + 1e-9)
+    keys = {
+        trial_key(each)
+        for each in (
+            spec(),
+            spec(1),
+            spec(xy=[0.1, 0.2]),
+            spec(xy=[0.1, 0.2 + 1e-12]),
+            spec(prototypes=[np.zeros(3)]),
+            spec(prototypes=[np.ones(3)]),
+            spec(regressor=fitted),
+            spec(regressor=other),
+        )
+    }
+    assert len(keys) == 8
+    assert trial_key(spec(regressor=again)) in keys
+    assert trial_key(dict(reversed(spec().items()))) in keys
+
+
+def test_a_trial_is_counted_once(tmp_path):
+    with TrialStore(tmp_path / "a.sqlite") as store:
+        store.put(spec(), {"reward": 1.0}, {})
+        store.put(spec(), {"reward": 2.0}, {})
+        assert len(store) == 1
+        assert store.get(spec())[0] == {"reward": 1.0}
+
+
+def test_nan_is_refused(tmp_path):
+    with (
+        TrialStore(tmp_path / "a.sqlite") as store,
+        pytest.raises(ValueError, match="JSON"),
+    ):
+        store.put(spec(), {"reward": float("nan")}, {})
+
+
+def test_a_foreign_file_is_refused(tmp_path):
+    path = tmp_path / "a.sqlite"
+    path.write_bytes(b"this is no database, but long enough for one" * 40)
+    with pytest.raises(InputError, match=r"a\.sqlite"):
+        TrialStore(path)
+
+
+def _write_for_ever(path):
+    with TrialStore(path) as store:
+        for i in range(1_000_000):
+            store.put(spec(i), {"reward": i}, {"x": np.full(100, float(i))})
+
+
+def test_a_kill_loses_no_finished_trial(tmp_path):
+    path = tmp_path / "a.sqlite"
+    process = multiprocessing.get_context("spawn").Process(
+        target=_write_for_ever, args=(path,)
+    )
+    process.start()
+    deadline = time.monotonic() + 60
+    seen = 0
+    while seen < 20 and time.monotonic() < deadline:
+        time.sleep(0.05)
+        if path.exists():
+            with TrialStore(path) as store:
+                seen = len(store)
+    os.kill(process.pid, signal.SIGKILL)
+    process.join()
+    with TrialStore(path) as store:
+        assert len(store) >= seen >= 20
+        for i in range(len(store)):
+            result, arrays = store.get(spec(i))
+            assert result == {"reward": i}
+            assert np.all(arrays["x"] == i)

@@ -1,0 +1,109 @@
+"""Scenarios: what loads, and how what does not fit is told."""
+
+import re
+
+import pytest
+
+from drake_affetto.common.errors import InputError
+from drake_affetto.station.scenario import (
+    Scenario,
+    load_scenario,
+    scenario_names,
+)
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_every_scenario_loads(name):
+    scenario = load_scenario(name)
+    assert isinstance(scenario, Scenario)
+    assert len(scenario.active_joints) == 8
+    assert scenario.active_joints[2] == scenario.yaw_joint == "waist_yaw"
+
+
+def test_a_scenario_extends_another():
+    direct, mirror = load_scenario("drumming"), load_scenario("mirror")
+    assert direct.look.mode == "centre"
+    assert mirror.look.mode == "fixed_yaw"
+    assert mirror.drum_region == direct.drum_region
+    assert mirror.dmp == direct.dmp
+
+
+def test_a_file_of_ones_own_extends_by_name_and_by_path(tmp_path):
+    first = tmp_path / "first.yaml"
+    first.write_text("extends: mirror\nrandom_seed: 5\ndmp:\n  duration: 2.0\n")
+    second = tmp_path / "second.yaml"
+    second.write_text("extends: first.yaml\nrandom_seed: 6\n")
+    scenario = load_scenario(second)
+    assert scenario.random_seed == 6
+    assert scenario.dmp.duration == 2.0
+    assert scenario.look == load_scenario("mirror").look
+
+
+def test_drakes_own_configs_are_read(tmp_path):
+    path = tmp_path / "s.yaml"
+    path.write_text(
+        "plant_config:\n  discrete_contact_approximation: similar\n"
+        "simulator_config:\n  target_realtime_rate: 1.0\n"
+    )
+    scenario = load_scenario(path)
+    assert scenario.plant_config.discrete_contact_approximation == "similar"
+    assert scenario.simulator_config.target_realtime_rate == 1.0
+    # What the file is silent on keeps the scenario's default, not Drake's.
+    assert scenario.plant_config.contact_model == "point"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("gase:\n  gain: 1", "s has no field 'gase'; did you mean 'gaze'"),
+        ("gaze:\n  gian: 1", "s.gaze has no field 'gian'; did you mean 'gain'"),
+        ("gaze:\n  gain: fast", "s.gaze.gain is 'fast', expected a number"),
+        ("gaze: 3", "s.gaze is 3, expected a mapping"),
+        ("active_joints: waist_yaw", "s.active_joints is 'waist_yaw'"),
+        ("dmp:\n  duration: -1", "s.dmp.duration is -1"),
+        ("random_seed: 1.5", "s.random_seed is 1.5, expected a whole number"),
+        ("look:\n  mode: sideways", "s.look.mode is 'sideways'"),
+        ("teaching:\n  lift: {mean: 9.0}", "s.teaching.lift.mean is 9.0"),
+        ("a: [1, 2", "is not YAML"),
+        ("- 1\n- 2", "holds no mapping"),
+        ("extends: drumning", "no scenario 'drumning'; did you mean"),
+        ("extends: s.yaml", "extends itself"),
+        ("extends: 4", "s.extends is 4"),
+        ("mirrors: 7", "s.mirrors is 7, expected a list"),
+        (
+            "plant_config:\n  time_step: 0.5",
+            "s.plant_config.time_step is 0.5",
+        ),
+        (
+            "plant_config:\n  timestep: 0.5",
+            "s.plant_config has no field 'timestep'",
+        ),
+        ("yaw_joint: left_elbow", "s.yaw_joint is 'left_elbow'"),
+        (
+            "world:\n  drum: package://drake_affetto/sdf/drumm.sdf",
+            "no such file: package://drake_affetto/sdf/drumm.sdf",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_named_in_one_line(tmp_path, text, message):
+    path = tmp_path / "s.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=re.escape(message)) as raised:
+        load_scenario(path)
+    assert "\n" not in str(raised.value)
+
+
+def test_an_unknown_name_offers_the_known_ones():
+    with pytest.raises(InputError, match="did you mean 'mirror'"):
+        load_scenario("miror")
+    with pytest.raises(InputError, match=r"known are .*drumming"):
+        load_scenario("../scenarios/drumming")
+    with pytest.raises(InputError, match="no such scenario file"):
+        load_scenario("nothing.yaml")
+
+
+def test_a_missing_sound_file_is_named(tmp_path):
+    path = tmp_path / "s.yaml"
+    path.write_text("sound: nowhere.yaml")
+    with pytest.raises(InputError, match=r"nowhere\.yaml"):
+        load_scenario(path)

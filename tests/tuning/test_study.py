@@ -1,0 +1,380 @@
+"""The tuning study, small and short but real: on the whole robot."""
+
+import json
+import os
+from pathlib import Path
+import re
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+
+import numpy as np
+import optuna
+from optuna.trial import TrialState
+from plotly.offline import get_plotlyjs
+import pytest
+import yaml
+
+from drake_affetto.cli.main import main
+from drake_affetto.control.pidf import load_control
+from drake_affetto.station.scenario import load_scenario
+from drake_affetto.tuning.references import HELD_OUT, REST, TEST, rest_std
+from drake_affetto.tuning.results import GAINS, START_FILE, TunePlan
+from drake_affetto.tuning.study import (
+    bench,
+    load_plan,
+    mirrored,
+    overlay_text,
+    run_tune,
+    scaled_gains,
+)
+
+JOINTS = ("right_elbow_rotation", "right_elbow_flexion")
+TRIALS = 8
+# Everything at its shortest: a trial is a second or two of the robot's time.
+SHORT = """
+settling: 0.1
+approach: 0.3
+tail: 0.1
+rest_delay: 0.05
+sines: {duration: 0.6}
+steps: {levels: [0.5], rise: 0.2, hold: 0.2}
+chirp: {duration: 0.5, low: 0.5, high: 1.0}
+strokes: {count: 1, stroke: 0.3, dwell: 0.1, back: 0.3, pause: 0.1}
+trapezoids: {count: 1, ramp: [0.2, 0.3], hold: [0.1, 0.2]}
+postures: {count: 1, move: 0.4, hold: 0.3}
+search: {population: 4, report_every: 0.4}
+"""
+
+
+def study_of(out):
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    return optuna.load_study(
+        study_name="tune", storage=f"sqlite:///{out}/study.sqlite"
+    )
+
+
+def by_candidate(out):
+    """Factors and costs of the finished trials of a study."""
+    trials = study_of(out).get_trials(
+        states=(TrialState.COMPLETE, TrialState.PRUNED)
+    )
+    return {
+        t.user_attrs["candidate"]: (t.params, t.user_attrs["joint_costs"])
+        for t in trials
+    }
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory):
+    path = tmp_path_factory.mktemp("tuning") / "short.yaml"
+    path.write_text(SHORT)
+    return path
+
+
+@pytest.fixture(scope="module")
+def plan(short):
+    return load_plan(JOINTS, seed=3, tuning=str(short))
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory, plan):
+    """A study that two workers did together."""
+    out = tmp_path_factory.mktemp("tune")
+    results = run_tune(out, plan, trials=TRIALS, workers=2)
+    return out, results
+
+
+@pytest.mark.slow
+def test_the_results_have_the_agreed_form(finished):
+    out, results = finished
+    assert json.loads((out / "results.json").read_text()) == results
+    assert results["study"] == "tune"
+    assert results["seed"] == 3
+    assert results["joints"] == list(JOINTS)
+    assert results["trials"]["finished"] == TRIALS
+    names = load_scenario("drumming").active_joints
+    for side in ("hand_tuned", "best"):
+        part = results[side]
+        assert set(part["trajectories"]) == {TEST, *HELD_OUT}
+        for trajectory in part["trajectories"].values():
+            assert list(trajectory["tracking_error_deg"]) == names
+        assert list(part["rest_oscillation_percent"]) == names
+    best, hand = results["best"]["cost"], results["hand_tuned"]["cost"]
+    assert results["improvement"] == pytest.approx(1.0 - best / hand)
+    assert set(results["held_out_improvement"]) == set(HELD_OUT)
+
+
+@pytest.mark.slow
+def test_degrees_and_percent_of_range_agree(finished, plan):
+    _, results = finished
+    part = results["best"]["trajectories"]["chirp"]
+    for joint, span in zip(bench(plan).names, bench(plan).span, strict=True):
+        assert part["tracking_error_deg"][joint] == pytest.approx(
+            part["tracking_percent"][joint] / 100.0 * np.degrees(span)
+        )
+
+
+@pytest.mark.slow
+def test_the_hand_tuned_start_is_trial_0(finished):
+    out, results = finished
+    first = study_of(out).get_trials()[0]
+    assert first.number == 0
+    assert first.state == TrialState.COMPLETE
+    assert set(first.params.values()) == {1.0}
+    # What the results say of it is what the trial has found.
+    assert results["hand_tuned"]["cost"] == pytest.approx(first.value)
+
+
+@pytest.mark.slow
+def test_two_workers_lose_and_repeat_no_trial(finished):
+    out, _ = finished
+    trials = study_of(out).get_trials()
+    assert len(trials) == TRIALS
+    assert {t.state for t in trials} <= {
+        TrialState.COMPLETE,
+        TrialState.PRUNED,
+    }
+    candidates = [t.user_attrs["candidate"] for t in trials]
+    assert sorted(candidates) == list(range(TRIALS))
+    params = {tuple(t.params.values()) for t in trials}
+    assert len(params) == TRIALS
+
+
+@pytest.mark.slow
+def test_the_best_is_what_was_found_and_is_not_worse(finished):
+    out, results = finished
+    study = study_of(out)
+    assert results["trials"]["best"] == study.best_trial.number
+    # The gains are written with four digits, so nearly the same.
+    assert results["best"]["cost"] == pytest.approx(study.best_value, rel=0.05)
+    assert results["best"]["cost"] <= 1.01 * results["hand_tuned"]["cost"]
+
+
+@pytest.mark.slow
+def test_gains_are_an_overlay_that_a_scenario_takes(finished, tmp_path):
+    out, results = finished
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "extends: drumming\n"
+        f"control:\n  overlays: ['{(out / 'gains.yaml').as_posix()}']\n"
+    )
+    control = load_scenario(path).control
+    loaded = load_control(control.parameters, tuple(control.overlays))
+    plain = load_control()
+    for joint in JOINTS:
+        for side in (joint, mirrored(joint)):
+            for gain in GAINS:
+                assert getattr(loaded.gains[side], gain) == pytest.approx(
+                    results["best"]["gains"][joint][gain]
+                )
+    # What was not searched stays.
+    assert loaded.gains["waist_yaw"] == plain.gains["waist_yaw"]
+    assert loaded.integral_limit == plain.integral_limit
+
+
+@pytest.mark.slow
+def test_the_page_needs_nothing_else(finished):
+    out, results = finished
+    page = (out / "study.html").read_text(encoding="utf-8")
+    assert page.startswith("<!DOCTYPE html>")
+    # One Plotly, in the page itself; its addresses are never asked for.
+    assert page.count(get_plotlyjs()) == 1
+    ours = page.replace(get_plotlyjs(), "")
+    for pattern in (r"<link", r"\bsrc\s*=", r"@import", r"url\("):
+        assert not re.search(pattern, ours), pattern
+    assert "http" not in ours
+    assert "prefers-color-scheme: dark" in ours
+    assert 'name="viewport"' in ours
+    data = re.search(
+        r'<script id="figures" type="application/json">(.*?)</script>',
+        ours,
+        flags=re.S,
+    )
+    figures = json.loads(data.group(1).replace("<\\/", "</"))
+    assert {"history", TEST, *HELD_OUT} <= set(figures)
+    traces = figures[TEST]["data"]
+    assert len(traces) == 3 * 8
+    for joint in results["best"]["gains"]:
+        assert joint.replace("_", " ") in ours
+
+
+@pytest.mark.slow
+def test_a_finished_study_is_not_run_again(finished, plan, monkeypatch):
+    out, results = finished
+
+    def refuse(*_):
+        raise AssertionError("all trials had been finished")
+
+    monkeypatch.setattr("drake_affetto.tuning.study.run_trial", refuse)
+    again = run_tune(out, plan, trials=TRIALS, workers=0, page=False)
+    assert again == results
+
+
+@pytest.mark.slow
+def test_killed_in_the_middle_it_goes_on(finished, short, tmp_path):
+    reference, _ = finished
+    command = [
+        *(sys.executable, "-m", "drake_affetto.cli", "tune"),
+        *("--joints", *JOINTS, "--seed", "3", "--tuning", str(short)),
+        *("--trials", str(TRIALS), "--workers", "1"),
+        *("--out", str(tmp_path)),
+    ]
+    process = subprocess.Popen(
+        command,
+        cwd=Path(__file__).parents[2],
+        stdout=subprocess.DEVNULL,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+    )
+    file = tmp_path / "study.sqlite"
+
+    def states():
+        try:
+            with sqlite3.connect(f"file:{file}?mode=ro", uri=True) as db:
+                return [
+                    row[0] for row in db.execute("SELECT state FROM trials")
+                ]
+        except sqlite3.Error:
+            return []
+
+    limit = time.monotonic() + 120.0
+    while True:
+        now = states()
+        if len([s for s in now if s != "RUNNING"]) >= 3 and "RUNNING" in now:
+            break
+        assert process.poll() is None, "it ended by itself"
+        assert time.monotonic() < limit
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    # Its worker has ended with it: nothing writes any more.
+    time.sleep(1.0)
+    kept = by_candidate(tmp_path)
+    assert 3 <= len(kept) < TRIALS
+    assert states().count("RUNNING") <= 1
+    time.sleep(0.5)
+    assert by_candidate(tmp_path) == kept
+    assert not (tmp_path / "results.json").exists()
+
+    # The rest is done in this process: workers make no difference either.
+    options = [*command[3:], "--workers", "0"]
+    assert main(options) == 0
+    after = by_candidate(tmp_path)
+    assert {k: after[k] for k in kept} == kept
+    assert sorted(after) == list(range(TRIALS))
+    assert "RUNNING" not in states()
+    # As if nothing had happened, whoever did the work.
+    assert after == by_candidate(reference)
+    ours = json.loads((tmp_path / "results.json").read_text())
+    theirs = json.loads((reference / "results.json").read_text())
+    assert ours["best"] == theirs["best"]
+
+
+@pytest.mark.slow
+def test_another_study_is_not_mixed_in(finished, short, capsys):
+    out, _ = finished
+    status = main(
+        [
+            *("tune", "--joints", JOINTS[0], "--tuning", str(short)),
+            *("--trials", "2", "--workers", "0", "--out", str(out)),
+        ]
+    )
+    assert status == 2
+    assert "--restart" in capsys.readouterr().err
+    assert len(by_candidate(out)) == TRIALS
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (["--trials", "0"], "--trials"),
+        (["--workers", "-1"], "--workers"),
+        (["--seed", "-1"], "--seed"),
+        (["--joints", "elbow"], "--joints"),
+        (["--joints", "waist_yaw", "waist_yaw"], "--joints"),
+        # A joint of the robot, but locked in this scenario.
+        (["--joints", "left_elbow_flexion"], "--joints"),
+        (["--scenario", "drumning"], "drumming"),
+        (["--start", "no_such.yaml"], "no_such.yaml"),
+        (["--tuning", "no_such.yaml"], "no_such.yaml"),
+    ],
+)
+def test_bad_options_are_told_before_anything_runs(
+    options, word, tmp_path, capsys
+):
+    out = tmp_path / "out"
+    assert main(["tune", *options, "--out", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert word in error
+    assert len(error.strip().splitlines()) == 1
+    assert not out.exists()
+
+
+def test_a_folder_with_something_else_in_it_is_told(tmp_path, short, capsys):
+    (tmp_path / "study.sqlite").write_text("this is no database at all" * 99)
+    status = main(
+        [
+            *("tune", "--joints", JOINTS[0], "--tuning", str(short)),
+            *("--trials", "1", "--workers", "0", "--out", str(tmp_path)),
+        ]
+    )
+    assert status == 2
+    assert "study.sqlite" in capsys.readouterr().err
+
+
+def test_factors_multiply_the_start():
+    names = ["waist_yaw", "right_elbow_flexion"]
+    start = load_control(START_FILE).for_joints(names)
+    gains = scaled_gains(start, names, {"right_elbow_flexion.kD": 2.0})
+    expected = start.to_array()
+    expected[2, 1] *= 2.0
+    np.testing.assert_array_equal(gains.to_array(), expected)
+
+
+def test_both_arms_get_the_same_gains():
+    names = ["waist_yaw", "right_elbow_flexion", "right_shoulder_flexion"]
+    start = load_control(START_FILE).for_joints(names)
+    plan = TunePlan(joints=("waist_yaw", "right_elbow_flexion"))
+    data = yaml.safe_load(overlay_text(plan, names, start, "heading"))
+    assert list(data["gains"]) == [
+        "waist_yaw",
+        "right_elbow_flexion",
+        "left_elbow_flexion",
+    ]
+    assert (
+        data["gains"]["left_elbow_flexion"]
+        == data["gains"]["right_elbow_flexion"]
+    )
+
+
+@pytest.mark.slow
+def test_the_default_gains_beat_the_hand_tuned_ones_and_rest():
+    plan = load_plan(None)
+    robot = bench(plan)
+    reference = robot.reference(TEST)
+    tuned, start = (
+        control.for_joints(robot.names)
+        for control in (load_control(), load_control(START_FILE))
+    )
+    after, before = (
+        robot.costs(reference, robot.run(reference, gains))
+        for gains in (tuned, start)
+    )
+    assert after.mean() < 0.7 * before.mean()
+    assert np.all(after.tracking < before.tracking)
+    assert after.tracking.mean() < 0.7 * before.tracking.mean()
+    # No limit cycle in any of several postures.
+    rest = robot.reference(REST)
+    q = robot.run(rest, tuned).q
+    swing = rest_std(q, rest.rest, robot.tuning.sample_rate) / robot.span
+    assert np.all(swing < 0.005)
+
+
+def test_the_tuned_gains_are_the_default():
+    """The study's start is not what the robot runs with."""
+    joints = load_scenario("drumming").active_joints
+    tuned = load_control().for_joints(joints).to_array()
+    start = load_control(START_FILE).for_joints(joints).to_array()
+    assert np.all(np.any(tuned != start, axis=0))
