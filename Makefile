@@ -49,7 +49,7 @@ test: lint
 	    $(PYTHON) -m pytest -n $(WORKERS) --dist loadfile $(ARGS)
 
 bench: setup
-	@$(PYTHON) analysis/benchmark.py $(ARGS)
+	@$(PYTHON) analysis/benchmarks/benchmark.py $(ARGS)
 
 clean:
 	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache

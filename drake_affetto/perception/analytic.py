@@ -3,7 +3,7 @@
 The disc's outline is projected, cut by the mirror's face and by the image's
 border, and what the robot's body hides is taken away; area and centroid are
 those of what is left. To that come the errors that the rendered chain has,
-with the sizes that it showed (see `analysis/bench_perception.py`):
+with the sizes that it showed (see `analysis/benchmarks/bench_perception.py`):
 
 - of the raster: the centroid of a disc drawn with whole pixels depends on
   where on the raster it lies. This error is a fixed function of the place, so

@@ -2,8 +2,8 @@
 
 For a grid of positions of the drum: can the palm strike the head from above,
 does the camera see the marker once the upper body has turned to it, and does
-it see the marker in the mirror from a fixed yaw. `analysis/workspace.py` draws
-the result.
+it see the marker in the mirror from a fixed yaw.
+`analysis/experiments/workspace.py` draws the result.
 """
 
 from collections.abc import Mapping

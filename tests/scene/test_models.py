@@ -3,6 +3,7 @@
 import colorsys
 import importlib.util
 import logging
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -49,6 +50,8 @@ CLASSES = {
     "H": (0.67, 0.02, (1e-4, 2e-3)),
     "N": (3.3, 0.15, (5e-4, 2e-3)),
 }
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_there_are_exactly_the_22_joints_each_with_its_actuator(scene):
@@ -286,7 +289,7 @@ def test_a_warning_of_the_parser_would_be_heard(caplog, tmp_path):
 
 @pytest.fixture(scope="module")
 def meshes():
-    path = models_dir() / "meshes/build_meshes.py"
+    path = ROOT / "tools" / "build_meshes.py"
     spec = importlib.util.spec_from_file_location("build_meshes", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -1,6 +1,6 @@
 """Speed, as ratios of things measured in the same run.
 
-    python analysis/benchmark.py [--only NAME ...] [--list]
+    python analysis/benchmarks/benchmark.py [--only NAME ...] [--list]
 
 Each benchmark is a function of a module beside this one that prints a few
 lines. Absolute times hold for this machine and this minute; the ratios say

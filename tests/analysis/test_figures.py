@@ -2,8 +2,6 @@
 
 import importlib.util
 import json
-from pathlib import Path
-import subprocess
 import sys
 
 import pytest
@@ -15,18 +13,7 @@ from drake_affetto.experiments.mirror import MirrorPlan, run_mirror
 from drake_affetto.runner.executor import TrialExecutor
 from drake_affetto.runner.store import TrialStore
 from support import fake_world
-
-ANALYSIS = Path(__file__).parents[2] / "analysis"
-
-
-def run(script, *words):
-    return subprocess.run(
-        [sys.executable, str(ANALYSIS / script), *map(str, words)],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        cwd=ANALYSIS.parent,
-    )
+from support.scripts import ANALYSIS, run
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +61,9 @@ def studies(tmp_path_factory):
     ],
 )
 def test_figures_are_drawn(studies, tmp_path, script, study):
-    done = run(f"{script}.py", "--results", studies / study, "--out", tmp_path)
+    done = run(
+        f"figures/{script}.py", "--results", studies / study, "--out", tmp_path
+    )
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / f"{script}.png").stat().st_size > 20_000
 
@@ -82,18 +71,18 @@ def test_figures_are_drawn(studies, tmp_path, script, study):
 @pytest.mark.slow
 @pytest.mark.parametrize("script", ["fig3_drumming", "fig5_mirror_transfer"])
 def test_what_is_not_a_study_is_told(tmp_path, script):
-    done = run(f"{script}.py", "--results", tmp_path, "--out", tmp_path)
+    done = run(f"figures/{script}.py", "--results", tmp_path, "--out", tmp_path)
     assert done.returncode == 2
     assert "no such file" in done.stderr
     (tmp_path / "results.json").write_text('{"study": "toy"}')
-    done = run(f"{script}.py", "--results", tmp_path, "--out", tmp_path)
+    done = run(f"figures/{script}.py", "--results", tmp_path, "--out", tmp_path)
     assert done.returncode == 2
     assert "results.json" in done.stderr
 
 
 def test_conditions_are_changed_one_at_a_time(tmp_path, monkeypatch):
     spec = importlib.util.spec_from_file_location(
-        "when_transfer_wins", ANALYSIS / "when_transfer_wins.py"
+        "when_transfer_wins", ANALYSIS / "experiments/when_transfer_wins.py"
     )
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
@@ -113,3 +102,19 @@ def test_conditions_are_changed_one_at_a_time(tmp_path, monkeypatch):
         script.CONDITIONS
     )
     assert (tmp_path / "when_transfer_wins.png").stat().st_size > 20_000
+
+
+@pytest.mark.slow
+def test_fig_2_is_drawn(tmp_path):
+    done = run("figures/fig2_toy.py", "--out", str(tmp_path))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "fig2_toy.png").stat().st_size > 10_000
+    wrong = run(
+        "figures/fig2_toy.py",
+        "--out",
+        str(tmp_path),
+        "--results",
+        str(tmp_path),
+    )
+    assert wrong.returncode == 2
+    assert "results.json" in wrong.stderr

@@ -1,6 +1,6 @@
 """How far simple maps carry from a changed view to the first one.
 
-python analysis/domain_maps.py [--out out/domain_maps] [--repeats 40]
+python analysis/experiments/view_maps.py [--out out/domain_maps] [--repeats 40]
 
 Prints and writes, for each scenario of a changed view, the residuals of the
 best affine, projective and quadratic map to the true one (table.md and

@@ -1,6 +1,6 @@
 """Computes and draws where the drum can be struck and seen, from above.
 
-python analysis/workspace.py [--out out/workspace.png] [--step 0.01]
+python analysis/experiments/workspace.py [--out out/workspace.png] [--step 0.01]
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """How the blob detection bears disturbances of the image.
 
-python analysis/perception_robustness.py [--out out/perception_robustness]
-    [--places 40]
+python analysis/experiments/perception_robustness.py [--places 40]
+    [--out out/perception_robustness]
 
 For each disturbance at three strengths: how often the marker is found at its
 true place (within 10 pixels), how often something else is taken for it, and

@@ -4,7 +4,7 @@ Needs numpy alone. Every mesh is a smooth surface swept along a path or
 deformed from a ball, in the frame of the link that carries it, in metres;
 link lengths are those of `sdf/affetto.sdf`. Run it again after a change:
 
-    python models/meshes/build_meshes.py
+    python tools/build_meshes.py
 """
 
 import dataclasses
@@ -522,7 +522,7 @@ MESHES = {
 
 
 def main() -> None:
-    folder = Path(__file__).resolve().parent
+    folder = Path(__file__).resolve().parents[1] / "models" / "meshes"
     for name, build in MESHES.items():
         build().write(folder / f"{name}.obj")
 

@@ -1,7 +1,7 @@
 """When does transfer win? Three schemes over what may decide it.
 
-    python analysis/when_transfer_wins.py [--samples 3 4 5 8 12] [--repeats 3]
-        [--workers N] [--out out/conditions]
+    python analysis/experiments/when_transfer_wins.py [--repeats 3]
+        [--samples 3 4 5 8 12] [--workers N] [--out out/conditions]
 
 Before the mirror, one thing at a time is changed from how the study `affetto
 mirror` has it: how much the teacher's demonstrations vary, how much of the

@@ -1,6 +1,7 @@
 """Does R > 0.15 tell drum hits from everything else? ROC and histogram.
 
-    python analysis/reward_separation.py [--count N] [--seed N] [--out DIR]
+    python analysis/experiments/reward_separation.py [--count N]
+        [--seed N] [--out DIR]
 
 Makes up trials of every kind (`drake_affetto.sound.separation`), judges each
 by the prototypes of 25 made-up demonstrations and by the experimenter's taps,

@@ -1,7 +1,7 @@
 """Measures the perception: accuracy, false alarms, cost, the gaze servo.
 
-python analysis/bench_perception.py [--only accuracy|false|cost|gaze|twin]
-    [--quick]
+python analysis/benchmarks/bench_perception.py [--quick]
+    [--only accuracy|false|cost|gaze|twin]
 
 Costs are CPU times of this process, told as ratios to one bare colour render
 of Drake's own RgbdSensor at the same size; images that are asked for twice in

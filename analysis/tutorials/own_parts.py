@@ -1,6 +1,6 @@
 """Tutorial: your own policy, your own motion and your own controller.
 
-    python analysis/tutorial_station.py
+    python analysis/tutorials/own_parts.py
 
 It runs top to bottom in less than half a minute, needs no display, and each
 part ends with what the drum says. Read it as a notebook: each `# %%` is a cell.

@@ -1,7 +1,8 @@
 """Before and after tuning: each joint on a trajectory, and its errors.
 
     affetto tune --out out/tune
-    python analysis/tune_pidf.py --study out/tune [--trajectory chirp]
+    python analysis/experiments/tune_pidf.py --study out/tune
+        [--trajectory chirp]
 
 Simulates the hand-tuned gains and those of the study along one trajectory
 (two runs of some seconds) and draws what the joints do.

@@ -1,6 +1,6 @@
 """Tutorial: learn a skill, look at it through another camera, transfer it.
 
-    python analysis/tutorial_transfer.py [--out DIR]
+    python analysis/tutorials/transfer.py [--out DIR]
 
 It runs top to bottom in well under half a minute, without Drake, and writes
 four figures. Read it as a notebook: each `# %%` is a cell.

@@ -1,6 +1,6 @@
 """Fig. 5: schemes of transfer side by side, and which of them differ.
 
-    python analysis/fig5_mirror_transfer.py [--results out/mirror]
+    python analysis/figures/fig5_mirror_transfer.py [--results out/mirror]
         [--out out/mirror]
 
 Draws from the folder of an `affetto mirror`: success of each scheme with 3, 4
@@ -10,19 +10,11 @@ mirror --all-scenarios` it draws success by scheme and scenario instead. Writes
 fig5_mirror_transfer.png.
 """
 
-import argparse
-import json
-from pathlib import Path
 import sys
 
-import matplotlib
-
-matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
-
-from drake_affetto.common.errors import InputError
-from drake_affetto.common.output import atomic_path, prepare_output
+import study_figure
 
 NAMES = {
     "unchanged": "unchanged",
@@ -135,39 +127,28 @@ def table(figure, results) -> None:
     figure.colorbar(image, ax=axes, label="success")
 
 
-def main() -> int:
-    """Draws and writes the figure."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--results", metavar="DIR", default="out/mirror")
-    parser.add_argument("--out", metavar="DIR", default="out/mirror")
-    args = parser.parse_args()
-    try:
-        path = Path(args.results) / "results.json"
-        if not path.is_file():
-            raise InputError(f"no such file: {path}")
-        results = json.loads(path.read_text())
-        if results.get("study") not in ("mirror", "scenarios"):
-            raise InputError(f"{path} is not of an `affetto mirror`")
-        out = prepare_output(args.out)
-    except InputError as error:
-        print(f"fig5_mirror_transfer: {error}", file=sys.stderr)
-        return 2
+def draw(results) -> plt.Figure:
+    """One view's figure, or the table of all views."""
     if results["study"] == "scenarios":
         figure = plt.figure(figsize=(11, 6), layout="constrained")
         table(figure, results)
-    else:
-        counts = results["samples"]
-        figure = plt.figure(figsize=(12, 8.5), layout="constrained")
-        upper, lower = figure.subfigures(2, 1, height_ratios=[1, 1.1])
-        bars(upper.subplots(), results)
-        panels = lower.subplots(1, len(counts), squeeze=False)[0]
-        for axes, count in zip(panels, counts, strict=True):
-            significance(axes, results, count)
-    with atomic_path(out / "fig5_mirror_transfer.png") as fresh:
-        figure.savefig(fresh, dpi=130)
-    print(out / "fig5_mirror_transfer.png")
-    return 0
+        return figure
+    counts = results["samples"]
+    figure = plt.figure(figsize=(12, 8.5), layout="constrained")
+    upper, lower = figure.subfigures(2, 1, height_ratios=[1, 1.1])
+    bars(upper.subplots(), results)
+    panels = lower.subplots(1, len(counts), squeeze=False)[0]
+    for axes, count in zip(panels, counts, strict=True):
+        significance(axes, results, count)
+    return figure
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(
+        study_figure.run(
+            "fig5_mirror_transfer",
+            __doc__.splitlines()[0],
+            ["mirror", "scenarios"],
+            draw,
+        )
+    )

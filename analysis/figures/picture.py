@@ -1,6 +1,6 @@
 """Renders the picture in the README: Affetto at its drum, with the mirror.
 
-python analysis/picture.py [--out docs/affetto.png]
+python analysis/figures/picture.py [--out docs/affetto.png]
 """
 
 import argparse
@@ -148,7 +148,7 @@ def _render(diagram: Diagram, context: Context) -> np.ndarray:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    root = Path(__file__).resolve().parent.parent
+    root = Path(__file__).resolve().parents[2]
     parser.add_argument("--out", type=Path, default=root / "docs/affetto.png")
     args = parser.parse_args()
 

@@ -1,6 +1,7 @@
 """Figs. 3b and 3c: what the drum sounds like, and success over demonstrations.
 
-    python analysis/fig3_drumming.py [--results out/drum] [--out out/drum]
+    python analysis/figures/fig3_drumming.py [--results out/drum]
+        [--out out/drum]
 
 Draws from the folder of an `affetto drum`: the reward as the prototypes slide
 over a hit and a miss (3b); success at unseen positions after each
@@ -10,32 +11,11 @@ and how each test ended; rewards of trials that touched the head and that did
 not. Writes fig3_drumming.png.
 """
 
-import argparse
-import json
-from pathlib import Path
 import sys
 
-import matplotlib
-
-matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
-
-from drake_affetto.common.errors import InputError
-from drake_affetto.common.output import atomic_path, prepare_output
-
-
-def load_results(folder: str, study: str) -> dict:
-    """The results of a study; InputError where there are none."""
-    path = Path(folder) / "results.json"
-    if not path.is_file():
-        raise InputError(f"no such file: {path}")
-    results = json.loads(path.read_text())
-    if results.get("study") != study:
-        raise InputError(
-            f"{path} is of study {results.get('study')!r}, expected {study!r}"
-        )
-    return results
+import study_figure
 
 
 def similarity(axes, results) -> None:
@@ -129,28 +109,16 @@ def separation(axes, results) -> None:
     axes.legend(fontsize=8)
 
 
-def main() -> int:
-    """Draws and writes the figure."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--results", metavar="DIR", default="out/drum")
-    parser.add_argument("--out", metavar="DIR", default="out/drum")
-    args = parser.parse_args()
-    try:
-        results = load_results(args.results, "drum")
-        out = prepare_output(args.out)
-    except InputError as error:
-        print(f"fig3_drumming: {error}", file=sys.stderr)
-        return 2
+def draw(results) -> plt.Figure:
+    """The four panels of the figure."""
     figure, axes = plt.subplots(2, 2, figsize=(11, 8), layout="constrained")
-    for draw, where in zip(
+    for panel, where in zip(
         (similarity, curves, workspace, separation), axes.flat, strict=True
     ):
-        draw(where, results)
-    with atomic_path(out / "fig3_drumming.png") as fresh:
-        figure.savefig(fresh, dpi=130)
-    print(out / "fig3_drumming.png")
-    return 0
+        panel(where, results)
+    return figure
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    title = __doc__.splitlines()[0]
+    sys.exit(study_figure.run("fig3_drumming", title, ["drum"], draw))

@@ -1,7 +1,7 @@
 """Fig. 2: a skill on its square, on the turned square, and after transfer.
 
-    python analysis/fig2_toy.py [--seed N] [--repeat N] [--domain unit|wide]
-        [--results DIR] [--out DIR]
+    python analysis/figures/fig2_toy.py [--seed N] [--repeat N]
+        [--domain unit|wide] [--results DIR] [--out DIR]
 
 Draws, for one seed and one choice of five points, what the ELM predicts (as
 colours between black contours of the truth, which the predictions should
@@ -12,19 +12,15 @@ errors on the other points are distributed over all seeds. Writes fig2_toy.png.
 """
 
 import argparse
-import json
-from pathlib import Path
 import sys
 import warnings
 
-import matplotlib
-
-matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+import study_figure
 
 from drake_affetto.common.errors import InputError
-from drake_affetto.common.output import atomic_path, prepare_output
+from drake_affetto.common.output import prepare_output
 from drake_affetto.experiments import toy
 
 
@@ -145,10 +141,7 @@ def main() -> int:
         out = prepare_output(args.out)
         results = None
         if args.results is not None:
-            path = Path(args.results) / "results.json"
-            if not path.is_file():
-                raise InputError(f"no such file: {path}")
-            results = json.loads(path.read_text())
+            results = study_figure.load_results(args.results, ["toy"])
     except InputError as error:
         print(f"fig2_toy: {error}", file=sys.stderr)
         return 2
@@ -158,9 +151,7 @@ def main() -> int:
     maps(parts[0], toy.DOMAINS[args.domain], args.seed, args.repeat)
     if results is not None:
         distributions(parts[1], results)
-    with atomic_path(out / "fig2_toy.png") as fresh:
-        figure.savefig(fresh, dpi=130)
-    print(out / "fig2_toy.png")
+    study_figure.save(figure, out, "fig2_toy")
     return 0
 
 

@@ -1,0 +1,25 @@
+"""The benchmarks, run as a reader would."""
+
+import re
+
+import pytest
+
+from support.scripts import run
+
+
+def test_benchmarks_are_listed_and_told_apart():
+    names = run("benchmarks/benchmark.py", "--list").stdout.split()
+    assert {"dmp", "elm", "transfer"} <= set(names)
+    wrong = run("benchmarks/benchmark.py", "--only", "magic")
+    assert wrong.returncode == 2
+    assert "magic" in wrong.stderr
+
+
+@pytest.mark.slow
+def test_benchmarks_of_learning_run():
+    done = run("benchmarks/benchmark.py", "--only", "dmp", "elm", "transfer")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "partial_fit of one sample" in done.stdout
+    # A ratio within one run, far below what is measured on a free machine.
+    (ratio,) = re.findall(r"32 starts, Eq. 5.* (\d+) × faster", done.stdout)
+    assert int(ratio) > 20
