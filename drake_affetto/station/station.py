@@ -329,17 +329,15 @@ class AffettoStation(Diagram):
             )
             pull = self.mouse_teacher.get_pulling_force_output_port()
         else:
-            self.teacher = builder.AddNamedSystem(
-                "kinesthetic_teacher",
-                KinestheticTeacher(self.plant, self.joints.names, teaching),
+            self.teacher = KinestheticTeacher.AddToBuilder(
+                builder=builder,
+                plant=self.plant,
+                joint_names=self.joints.names,
+                config=teaching,
             )
             builder.Connect(
                 self._estimated_state,
                 self.teacher.get_estimated_state_input_port(),
-            )
-            builder.Connect(
-                self.teacher.get_spatial_force_output_port(),
-                self.plant.get_applied_spatial_force_input_port(),
             )
             pull = self.teacher.get_pulling_force_output_port()
         builder.ExportOutput(pull, "teacher.pulling_force")

@@ -1,4 +1,4 @@
-"""Demonstrations and the file that keeps them.
+"""Demonstrations and the HDF5 file that keeps them.
 
 The file is HDF5. Its root carries the attributes `format`, `format_version`
 and `about`; each demonstration is a group `demonstrations/000000`, ... with
@@ -7,10 +7,11 @@ and `about`; each demonstration is a group `demonstrations/000000`, ... with
   `task_parameter` (d,), `prototype` (bands, frames) and `drum_xy` (2,), each
   with a checksum and the attributes `unit` and `about`;
 - attributes `joint_names` (n), `attempt`, `teacher`, `scenario`, `version`,
-  and where they exist `seed`, `reward` and `max_pull` [N].
+  and where they exist `seed`, `reward` and `max_pull`, N.
 
-A demonstration is added to a copy, which then takes the file's place: whoever
-is stopped at any moment loses the one being written and nothing else.
+A demonstration is added to a copy, which then replaces the file. If the
+process is killed at any moment, only the demonstration that it was writing is
+lost.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -25,14 +26,12 @@ from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
 import drake_affetto
 from drake_affetto.common.csv_columns import read_columns
 from drake_affetto.common.errors import InputError, require, require_file
 from drake_affetto.common.output import atomic_path
-
-FloatArray = NDArray[np.float64]
+from drake_affetto.common.typing import Array
 
 FORMAT = "drake_affetto demonstrations"
 FORMAT_VERSION = 1
@@ -54,10 +53,10 @@ ROBOT_LOG_JOINTS = (
 )
 """The joints of the 13-DOF robot in the order of its logs: q0, q1, ..."""
 
-# What h5py raises where a file holds something else than it should.
+# What h5py raises for a damaged file.
 _DAMAGE = (KeyError, OSError, RuntimeError, TypeError, ValueError)
 
-# Field of `Demonstration`: unit and meaning, as the file tells them.
+# Unit and meaning of each array of `Demonstration`, as written to the file.
 _ARRAYS = {
     "t": ("s", "time of each sample"),
     "q": ("rad", "joint angles, a column for each of joint_names"),
@@ -70,41 +69,43 @@ _ARRAYS = {
 
 @dataclasses.dataclass(eq=False)
 class Demonstration:
-    """One movement that a teacher showed, and what came of it.
+    """One demonstrated movement, and the outcome of its replay.
+
+    Attributes:
+        t: Times (T,), rising, s.
+        q: Joint angles (T, n), rad.
+        joint_names: Names of the n joints.
+        drum_xy: Position of the drum on the table (2,), world frame, m.
+        seed: Seed of everything that is random in it.
+        attempt: Number of earlier attempts at the same position.
+        theta: Policy parameters (n K,), encoded from `q`.
+        task_parameter: Task parameter (d,), if the gaze found the drum.
+        reward: Reward of the robot's own replay.
+        prototype: Spectrogram of that replay's sound (bands, frames).
+        max_pull: Greatest force of the teacher, N.
+        teacher: Kind of teacher: "simulated", "by mouse", or other text.
+        scenario: Name of the scenario, or of the log that it comes from.
+        version: Version of this package that made it.
 
     Raises:
-        InputError: for arrays that do not fit each other, times that do not
-            rise, or numbers that are not finite.
+        InputError: If arrays do not fit each other, times do not rise, or
+            numbers are not finite.
     """
 
-    t: FloatArray
-    """Times (T,) [s], rising."""
-    q: FloatArray
-    """Joint angles (T, n) [rad]."""
+    t: Array
+    q: Array
     joint_names: tuple[str, ...]
-    """Names of the n joints."""
-    drum_xy: FloatArray | None = None
-    """Where the drum stood on the table (2,), world frame [m]."""
+    drum_xy: Array | None = None
     seed: int | None = None
-    """Seed of everything random in it."""
     attempt: int = 0
-    """How many attempts at the same place came before it."""
-    theta: FloatArray | None = None
-    """Policy parameters (n K,) encoded from `q`."""
-    task_parameter: FloatArray | None = None
-    """Task parameter (d,) if the drum was looked at."""
+    theta: Array | None = None
+    task_parameter: Array | None = None
     reward: float | None = None
-    """Reward of the robot's own replay."""
-    prototype: FloatArray | None = None
-    """Spectrogram (bands, frames) of that replay's sound."""
+    prototype: Array | None = None
     max_pull: float | None = None
-    """Greatest force with which the teacher pulled [N]."""
     teacher: str = ""
-    """Who taught: "simulated", "by mouse", or whatever is known."""
     scenario: str = ""
-    """Name of the scenario, or of the log it was converted from."""
     version: str = drake_affetto.__version__
-    """Version of this package that made it."""
 
     def __post_init__(self):
         self.joint_names = tuple(str(name) for name in self.joint_names)
@@ -173,16 +174,16 @@ class Demonstration:
 
 
 def append_demonstration(path: str | Path, demonstration: Demonstration) -> int:
-    """Adds a demonstration to the file, which is made where there is none.
+    """Adds a demonstration to a file; creates the file if there is none.
 
     Several processes may add to one file.
 
     Returns:
-        How many the file now holds.
+        Number of demonstrations that the file holds now.
 
     Raises:
-        InputError: if the file is not one of demonstrations, is damaged or
-            cannot be written. It is then left as it was.
+        InputError: If the file is not one of demonstrations, is damaged or
+            cannot be written. Then it is not changed.
     """
     path = Path(path)
     with _only_writer(path), atomic_path(path) as fresh:
@@ -205,10 +206,10 @@ def append_demonstration(path: str | Path, demonstration: Demonstration) -> int:
 def write_demonstrations(
     path: str | Path, demonstrations: Iterable[Demonstration]
 ) -> None:
-    """Writes a file of exactly these, whole or not at all.
+    """Writes a file of exactly these demonstrations, whole or not at all.
 
     Raises:
-        InputError: if it cannot be written.
+        InputError: If it cannot be written.
     """
     path = Path(path)
     with _only_writer(path), atomic_path(path) as fresh:
@@ -228,8 +229,9 @@ def read_demonstrations(path: str | Path) -> list[Demonstration]:
     """All demonstrations of a file, in the order in which they were added.
 
     Raises:
-        InputError: if there is no such file, it is not one of demonstrations,
-            comes from a newer version of this package, or is damaged.
+        InputError: If there is no such file, or it is not one of
+            demonstrations, was written by a newer version of this package, or
+            is damaged.
     """
     path = require_file("demonstrations", path)
     with _opened(path) as file:
@@ -254,21 +256,23 @@ def from_robot_csv(
     joints: Sequence[str] = ROBOT_LOG_JOINTS,
     drum_xy: Sequence[float] | None = None,
 ) -> Demonstration:
-    """Converts a log that the robot's own library wrote.
+    """Converts a log of the robot's own library.
 
-    Column `t` is time in seconds, columns `q0`, `q1`, ... the measured angles
-    in percent of each joint's range. Time then starts at 0.
+    Column `t` is the time in seconds. Columns `q0`, `q1`, ... are the measured
+    angles in percent of each joint's range. The demonstration's time starts
+    at 0.
 
     Args:
-        path: the CSV file.
-        limits: lower and upper limit [rad] of the joints that are wanted, by
-            name; the demonstration has them in this order.
-        joints: names of the log's joints, for q0, q1, ...
-        drum_xy: where the drum stood, if that is known [m].
+        path: The CSV file.
+        limits: Lower and upper limit of each wanted joint, rad, by name. The
+            demonstration has the joints in this order.
+        joints: Names of the log's joints, for q0, q1, ...
+        drum_xy: Position of the drum (2,), if it is known, m.
 
     Raises:
-        InputError: for a missing file or column, a cell that is not a number,
-            times that do not rise, an unknown joint, or limits that are none.
+        InputError: If the file or a column is missing, a cell is not a number,
+            times do not rise, a joint is unknown, or limits are in the wrong
+            order.
     """
     path = require_file("log", path)
     require(len(limits) > 0, "limits", limits, "at least one joint")
@@ -300,9 +304,12 @@ def from_robot_csv(
 def _opened(
     file_path: Path, mode: str = "r", name: Path | None = None
 ) -> Iterator[h5py.File]:
-    """The file, known to be one of demonstrations.
+    """Opens a file and checks that it is one of demonstrations.
 
-    Errors call it `name`, if that is given: a copy has no name of its own.
+    Args:
+        file_path: The file.
+        mode: Mode of h5py; "x" creates the file.
+        name: Name in error messages, for a temporary copy.
     """
     path = name or file_path
     try:
@@ -389,7 +396,7 @@ def _read(group: h5py.Group) -> Demonstration:
         attempt=int(attributes["attempt"]),
         reward=reward,
         max_pull=max_pull,
-        # Files of earlier versions do not tell.
+        # Files of earlier versions do not have it.
         teacher=str(attributes.get("teacher", "")),
         scenario=str(attributes["scenario"]),
         version=str(attributes["version"]),
@@ -398,10 +405,11 @@ def _read(group: h5py.Group) -> Demonstration:
 
 @contextlib.contextmanager
 def _only_writer(path: Path) -> Iterator[None]:
-    """Holds all other writers of this folder off, and tidies up after them.
+    """Locks the folder against other writers, and removes their leftovers.
 
-    The lock goes with the process, however that ends; what it leaves is a
-    hidden copy beside the file, which the next writer removes.
+    The operating system releases the lock when the process ends, even if it is
+    killed. Then a hidden copy remains beside the file, which the next writer
+    removes.
     """
     try:
         folder = os.open(path.parent, os.O_RDONLY)
@@ -423,7 +431,7 @@ def _only_writer(path: Path) -> Iterator[None]:
 
 
 def _short(error: Exception) -> str:
-    """The first line of what a library says, without its parentheses."""
+    """The first line of an error message, without quotation marks."""
     strerror = getattr(error, "strerror", None)
     lines = str(strerror or error).splitlines() or [type(error).__name__]
     return lines[0].strip("'\"")

@@ -1,4 +1,4 @@
-"""The system that pulls the robot's hand as a person does."""
+"""The simulated kinesthetic teacher as a system."""
 
 from collections.abc import Sequence
 
@@ -13,6 +13,7 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.framework import (
     BasicVector,
     Context,
+    DiagramBuilder,
     DiscreteValues,
     InputPort,
     LeafSystem,
@@ -20,6 +21,7 @@ from pydrake.systems.framework import (
 )
 
 from drake_affetto.common.errors import require
+from drake_affetto.common.typing import Array
 from drake_affetto.teaching.stroke import (
     Stroke,
     TeacherConfig,
@@ -31,11 +33,11 @@ from drake_affetto.teaching.stroke import (
 
 
 class KinestheticTeacher(LeafSystem):
-    """A person who leads the robot's palm along a stroke (paper Sec. V).
+    """A simulated person who moves the robot's palm along a stroke.
 
-    The teacher takes hold of the palm at `start_time`, wherever it is then,
-    and pulls at that one point, with a force and no torque. Without a stroke
-    the output is an empty list.
+    This is the kinesthetic teaching of the paper, Sec. V. The teacher grasps
+    the palm at `start_time`, at its position at that time, and applies a force
+    there, but no torque. Without a stroke the output is an empty list.
 
     .. pydrake_system::
 
@@ -46,9 +48,9 @@ class KinestheticTeacher(LeafSystem):
         - spatial_force
         - pulling_force
 
-    - estimated_state: (2n) angles and rates of the led joints, rad, rad/s.
+    - estimated_state: angles and rates of the n joints (2n), rad, rad/s.
     - spatial_force: list[ExternallyAppliedSpatialForce], at most one entry.
-    - pulling_force: (3) the same force on the palm, in the world, N.
+    - pulling_force: the same force on the palm (3), world frame, N.
 
     The stroke and its start are an abstract parameter; see `set_stroke`.
     """
@@ -60,15 +62,17 @@ class KinestheticTeacher(LeafSystem):
         config: TeacherConfig,
         palm_frame: str = "right_palm",
     ):
-        """Reads the palm from a finalized `plant`.
+        """Makes a teacher for a robot.
 
         Args:
-            plant: holds the robot; only its kinematics are used.
-            joint_names: the n joints of `estimated_state`, in its order.
-            palm_frame: the frame whose origin is pulled.
+            plant: Finalized plant of the robot, used for its kinematics only.
+            joint_names: Names of the n joints, in the order of
+                `estimated_state`.
+            config: Parameters of the teacher.
+            palm_frame: Frame at whose origin the force is applied.
 
         Raises:
-            InputError: if `config` does not fit.
+            InputError: If `config` does not fit.
         """
         super().__init__()
         config.check("teaching")
@@ -110,8 +114,43 @@ class KinestheticTeacher(LeafSystem):
             prerequisites_of_calc={self.xd_ticket()},
         )
 
+    @staticmethod
+    def AddToBuilder(
+        *,
+        builder: DiagramBuilder,
+        plant: MultibodyPlant,
+        joint_names: Sequence[str],
+        config: TeacherConfig,
+        palm_frame: str = "right_palm",
+        name: str = "kinesthetic_teacher",
+    ) -> "KinestheticTeacher":
+        """Adds a teacher whose force acts on `plant`.
+
+        The input `estimated_state` is left to be connected.
+
+        Args:
+            builder: Builder of the diagram.
+            plant: Finalized plant in `builder`, whose applied_spatial_force
+                port is not connected yet.
+            joint_names: Names of the n joints of `estimated_state`.
+            config: Parameters of the teacher.
+            palm_frame: Frame at whose origin the force is applied.
+            name: Name of the system.
+
+        Raises:
+            InputError: If `config` does not fit.
+        """
+        teacher = builder.AddNamedSystem(
+            name, KinestheticTeacher(plant, joint_names, config, palm_frame)
+        )
+        builder.Connect(
+            teacher.get_spatial_force_output_port(),
+            plant.get_applied_spatial_force_input_port(),
+        )
+        return teacher
+
     def get_estimated_state_input_port(self) -> InputPort:
-        """The (2n) angles and rates of the led joints."""
+        """Angles and rates of the n joints (2n), rad, rad/s."""
         return self._state_port
 
     def get_spatial_force_output_port(self) -> OutputPort:
@@ -119,26 +158,30 @@ class KinestheticTeacher(LeafSystem):
         return self._force_port
 
     def get_pulling_force_output_port(self) -> OutputPort:
-        """The force on the palm, (3) N in the world."""
+        """Force on the palm (3), world frame, N."""
         return self._pulling_port
 
-    def set_posture(self, q: np.ndarray) -> None:
-        """Tells the teacher's eye where the joints that are not led stand.
+    def set_posture(self, q: Array) -> None:
+        """Sets the positions of the joints that are not in the input.
 
         Args:
-            q: (nq,) positions of the whole plant; those of the led joints
-                are replaced by the input's at each update.
+            q: Positions of the whole plant (nq,). Those of the n joints are
+                replaced by the input's at each update.
         """
         self._plant.SetPositions(self._plant_context, q)
 
     def set_stroke(
         self, context: Context, stroke: Stroke | None, start_time: float
     ) -> None:
-        """Sets what is taught, and when the palm is grasped.
+        """Sets the stroke, and the time at which the palm is grasped.
 
         Args:
-            stroke: the intended motion, or None to let go of the robot.
-            start_time: s; must be finite where there is a stroke.
+            context: Context of this system.
+            stroke: The intended motion, or None to release the robot.
+            start_time: Time of the grasp, s; finite where there is a stroke.
+
+        Raises:
+            InputError: If `start_time` is not finite.
         """
         require(
             stroke is None or np.isfinite(start_time),
@@ -149,16 +192,16 @@ class KinestheticTeacher(LeafSystem):
         context.get_mutable_abstract_parameter(self._stroke_index).set_value(
             {"stroke": stroke, "start_time": float(start_time)}
         )
-        # The next update grasps the palm anew.
+        # The next update is a new grasp.
         context.get_mutable_discrete_state(self._memory).SetFromVector(
             np.zeros(16)
         )
 
-    def palm(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Position and velocity of the palm, (3,) m and (3,) m/s in the world.
+    def palm(self, state: Array) -> tuple[Array, Array]:
+        """Position (3,), m, and velocity (3,), m/s, of the palm, world frame.
 
         Args:
-            state: (2n) as in `estimated_state`.
+            state: Angles and rates (2n), as in `estimated_state`.
         """
         plant, context, world = (
             self._plant,
@@ -180,8 +223,8 @@ class KinestheticTeacher(LeafSystem):
         return X_WB @ self._p_BoPalm, J[:, self._v_index] @ state[self._n :]
 
     def _update(self, context: Context, values: DiscreteValues) -> None:
-        lesson = context.get_abstract_parameter(self._stroke_index).get_value()
-        stroke, start_time = lesson["stroke"], lesson["start_time"]
+        task = context.get_abstract_parameter(self._stroke_index).get_value()
+        stroke, start_time = task["stroke"], task["start_time"]
         memory = values.get_mutable_value(self._memory)
         # Half an update of slack: a start on the grid is not missed by 1 ulp.
         t = context.get_time() - start_time
@@ -194,7 +237,7 @@ class KinestheticTeacher(LeafSystem):
             memory[1:4] = palm
             state = TeacherState.at(palm)
         elif t > self._config.duration:
-            # The demonstration is over: the teacher lets go.
+            # The demonstration is over: the teacher releases the palm.
             memory[13:16] = 0.0
             return
         else:

@@ -1,4 +1,4 @@
-"""A person pulls the robot's hand with the mouse, in the browser."""
+"""Mouse teaching: a person moves the robot's hand in the browser."""
 
 import numpy as np
 from pydrake.common.value import Value
@@ -23,6 +23,7 @@ from pydrake.systems.framework import (
 from pydrake.visualization import ApplyVisualizationConfig, VisualizationConfig
 
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.typing import Array
 from drake_affetto.teaching.stroke import TeacherConfig
 
 # The field by which Drake offers its mouse spring.
@@ -33,19 +34,20 @@ def require_mouse_spring() -> None:
     """Raises InputError on a Drake that has no mouse spring."""
     if not any(f.name == _STIFFNESS for f in VisualizationConfig.__fields__):
         raise InputError(
-            "teaching by hand needs a Drake whose Meshcat has a mouse spring "
+            "teaching by mouse needs a Drake whose Meshcat has a mouse spring "
             "(1.58 has it, 1.51 does not)"
         )
 
 
 class MouseTeacher(LeafSystem):
-    """A teacher's arm between the mouse and the robot's hand.
+    """Impedance of a teacher's arm, between the mouse and the robot's hand.
 
-    Drake's mouse spring pulls at whatever body is dragged, as far as the mouse
-    goes, and from where the browser last drew the grabbed point, some
-    hundredths of a second ago: a stiff spring then shakes the arm. Here only
-    the hand can be taken hold of, the point that is grabbed stays where it was
-    grabbed, and stiffness, damping and strength are the teacher's own.
+    Drake's mouse spring has three properties that do not suit teaching: it
+    acts on any body, its force has no limit, and it starts from the position
+    of the grasped point that the browser drew last, some hundredths of a
+    second ago, so that a stiff spring shakes the arm. This system passes a
+    force to the hand only. The grasped point is fixed to the hand, and
+    stiffness, damping and maximum force are those of the teacher.
 
     .. pydrake_system::
 
@@ -59,12 +61,12 @@ class MouseTeacher(LeafSystem):
         - pulling_force
 
     - mouse_force: list[ExternallyAppliedSpatialForce] of Drake's mouse spring.
-    - body_poses, body_spatial_velocities: of the plant.
+    - body_poses, body_spatial_velocities: the plant's outputs.
     - spatial_force: list[ExternallyAppliedSpatialForce], at most one entry.
-    - pulling_force: (3) its force, in the world, N; zero while nobody pulls.
+    - pulling_force: its force (3), world frame, N; zero without a grasp.
 
-    The discrete state holds whether the hand is held, and where (in its own
-    frame, m).
+    The discrete state (4) is 1 during a grasp, else 0, and the grasped point
+    in the hand's frame, m.
     """
 
     def __init__(
@@ -73,15 +75,15 @@ class MouseTeacher(LeafSystem):
         config: TeacherConfig,
         palm_frame: str = "right_palm",
     ):
-        """Reads which body is the hand from a finalized `plant`.
+        """Makes a teacher for a robot.
 
         Args:
-            plant: holds the robot.
-            config: the teacher's arm.
-            palm_frame: a frame on the body that may be pulled.
+            plant: Finalized plant of the robot.
+            config: Parameters of the teacher.
+            palm_frame: Any frame of the hand.
 
         Raises:
-            InputError: if `config` does not fit.
+            InputError: If `config` does not fit.
         """
         super().__init__()
         config.check("teaching")
@@ -123,7 +125,7 @@ class MouseTeacher(LeafSystem):
         )
 
     def get_mouse_force_input_port(self) -> InputPort:
-        """What the mouse spring asks for."""
+        """Forces of Drake's mouse spring."""
         return self._force_in
 
     def get_spatial_force_output_port(self) -> OutputPort:
@@ -131,7 +133,7 @@ class MouseTeacher(LeafSystem):
         return self._force_port
 
     def get_pulling_force_output_port(self) -> OutputPort:
-        """The force on the hand, (3) N in the world."""
+        """Force on the hand (3), world frame, N."""
         return self._pulling_port
 
     @staticmethod
@@ -143,15 +145,22 @@ class MouseTeacher(LeafSystem):
         meshcat: Meshcat,
         config: TeacherConfig,
         palm_frame: str = "right_palm",
+        name: str = "mouse_teacher",
     ) -> "MouseTeacher":
         """Adds Drake's mouse spring and, between it and the plant, a teacher.
 
         Args:
-            plant: finalized, in `builder`; its applied_spatial_force is still
-                free.
+            builder: Builder of the diagram.
+            plant: Finalized plant in `builder`, whose applied_spatial_force
+                port is not connected yet.
+            scene_graph: Scene graph in `builder`, with the plant's shapes.
+            meshcat: Meshcat in whose browser window the person drags.
+            config: Parameters of the teacher.
+            palm_frame: Any frame of the hand.
+            name: Name of the system.
 
         Raises:
-            InputError: if this version of Drake has no mouse spring.
+            InputError: If this version of Drake has no mouse spring.
         """
         require_mouse_spring()
         hand = plant.GetFrameByName(palm_frame).body()
@@ -173,13 +182,13 @@ class MouseTeacher(LeafSystem):
             meshcat=meshcat,
             lcm=DrakeLcm("memq://null"),
         )
-        # Drake has connected the spring to the plant; the teacher stands
-        # between the two.
+        # Drake has connected the spring to the plant: put the teacher between
+        # the two.
         port = plant.get_applied_spatial_force_input_port()
         spring = _source(builder, plant, port)
         builder.Disconnect(spring, port)
         teacher = builder.AddNamedSystem(
-            "mouse_teacher", MouseTeacher(plant, config, palm_frame)
+            name, MouseTeacher(plant, config, palm_frame)
         )
         builder.Connect(spring, teacher.get_mouse_force_input_port())
         for name in ("body_poses", "body_spatial_velocities"):
@@ -190,7 +199,7 @@ class MouseTeacher(LeafSystem):
         return teacher
 
     def _drag(self, context: Context) -> ExternallyAppliedSpatialForce | None:
-        """What the mouse spring would do to the hand."""
+        """The mouse spring's force on the hand, if there is one."""
         for force in self._force_in.Eval(context):
             if force.body_index == self._hand:
                 return force
@@ -205,8 +214,8 @@ class MouseTeacher(LeafSystem):
             grip[0] = 1.0
             grip[1:] = drag.p_BoBq_B
 
-    def _pull(self, context: Context) -> tuple[np.ndarray, np.ndarray] | None:
-        """Point of the hand that is pulled, in its frame, and force (3) N."""
+    def _pull(self, context: Context) -> tuple[Array, Array] | None:
+        """Grasped point (3,), hand frame, m, and force (3,), world frame, N."""
         drag = self._drag(context)
         if drag is None:
             return None
@@ -214,13 +223,15 @@ class MouseTeacher(LeafSystem):
         X_WB = self._poses_in.Eval(context)[self._hand]
         V_WB = self._velocities_in.Eval(context)[self._hand]
 
-        def move(p_BoBq_B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        def move(p_BoBq_B: Array) -> tuple[Array, Array]:
             V_WBq = V_WB.Shift(X_WB.rotation() @ p_BoBq_B)
             return X_WB @ p_BoBq_B, V_WBq.translational()
 
+        # The position of the mouse, from the spring's force.
         p_WBq, v_WBq = move(drag.p_BoBq_B)
         f = drag.F_Bq_W.translational() + self._mouse_damping * v_WBq
         mouse = p_WBq + f / config.stiffness
+        # The teacher's impedance between it and the grasped point.
         grip = context.get_discrete_state(self._grip).value()
         held = grip[1:].copy() if grip[0] else drag.p_BoBq_B
         p_WBq, v_WBq = move(held)

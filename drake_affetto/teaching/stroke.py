@@ -1,9 +1,9 @@
-"""How a person's hand leads the robot's hand to the drum and back.
+"""Model of a person who moves the robot's hand to the drum and back.
 
-A person does not impose a trajectory: an intended motion (smooth, no faster
-than a human arm) pulls through the impedance of the teacher's own arm, with a
-bounded force and some tremor. A slow integral stands for the teacher watching
-the hand and correcting what is left of the error.
+The teacher's force is that of an impedance about an intended motion, which is
+smooth and no faster than a human arm. Tremor is added, and the force is
+bounded. An integral of the hand's position error models that the teacher
+watches the hand and corrects the error that remains.
 """
 
 import dataclasses
@@ -13,52 +13,59 @@ from typing import Any
 import numpy as np
 
 from drake_affetto.common.errors import require_range
+from drake_affetto.common.typing import Array
 
 
 @dataclasses.dataclass
-class Variation:
-    """A number that differs from demonstration to demonstration."""
+class ClippedNormal:
+    """A normal distribution, clipped at two standard deviations.
+
+    Attributes:
+        mean: Mean, before a lower bound is applied.
+        sd: Standard deviation.
+    """
 
     mean: float = 0.0
     sd: float = 0.0
 
     def draw(self, rng: np.random.Generator, low: float) -> float:
-        """Draws a value within two standard deviations, at least `low`."""
+        """Draws a value that is at least `low`."""
         deviation = float(np.clip(rng.standard_normal(), -2.0, 2.0))
         return max(low, self.mean + self.sd * deviation)
 
 
-def _vary(mean: float, sd: float):
-    return dataclasses.field(default_factory=lambda: Variation(mean, sd))
+def _normal(mean: float, sd: float) -> Any:
+    return dataclasses.field(default_factory=lambda: ClippedNormal(mean, sd))
 
 
 @dataclasses.dataclass
 class TeacherConfig:
-    """The teacher's arm and habits.
+    """Parameters of the teacher's arm and strokes.
 
     Attributes:
-        duration: length of a demonstration, s (paper: 3 s).
-        recording_rate: rate at which joint angles are recorded, Hz.
-        update_rate: rate of the teacher's force, Hz.
-        stiffness: of the teacher's arm, N/m.
-        damping: of the teacher's arm, N s/m.
-        watching: integral of the hand's position error, N/(m s).
-        max_force: the most a teacher pulls with, N.
-        bandwidth: of the intended motion, Hz.
-        tremor: standard deviation of the tremor's force, N (6 to 12 Hz).
-        gain_scale: share of the playback gains kP, kD that is left on while
-            teaching; with all of them a person cannot move the arm.
-        settling_time: how long the equilibrium outputs u_eq are averaged, s.
-        lift: height above the head from which the stroke begins, m.
-        reach_time: from the grasp to that height, s.
-        stroke_time: from there to the head, s.
-        press_depth: how far the soft hand is pressed into the head, m.
-        dwell_time: how long it is pressed, s.
-        return_time: back to that height, s.
-        aim_sd: standard deviation of the point aimed at on the head, m.
-        firmer_depth: what each repeated attempt adds to the depth, m.
-        firmer_dwell: what each repeated attempt adds to the dwell, s.
-        max_attempts: how often one position is tried.
+        duration: Duration of a demonstration, s (paper: 3 s).
+        recording_rate: Rate at which joint angles are recorded, Hz.
+        update_rate: Update rate of the teacher's force, Hz.
+        stiffness: Stiffness of the teacher's arm, N/m.
+        damping: Damping of the teacher's arm, N s/m.
+        watching: Integral gain on the hand's position error, N/(m s).
+        max_force: Greatest force of the teacher, N.
+        bandwidth: Bandwidth of the intended motion, Hz.
+        tremor: Standard deviation of the tremor's force, N (6 to 12 Hz).
+        gain_scale: Factor of the controller's gains kP and kD during a
+            demonstration. With the full gains a person cannot move the arm.
+        settling_time: Time over which the controller's output at equilibrium,
+            u_eq, is averaged, s.
+        lift: Height above the drum's head at which the stroke begins, m.
+        reach_time: Time from the grasp to that height, s.
+        stroke_time: Time from that height to the head, s.
+        press_depth: Depth to which the soft hand is pressed into the head, m.
+        dwell_time: Time for which it is pressed, s.
+        return_time: Time from the head back to that height, s.
+        aim_sd: Standard deviation of the target point on the head, m.
+        firmer_depth: Increment of the depth for each further attempt, m.
+        firmer_dwell: Increment of the dwell for each further attempt, s.
+        max_attempts: Maximum number of attempts at one position.
     """
 
     duration: float = 3.0
@@ -72,24 +79,26 @@ class TeacherConfig:
     tremor: float = 0.15
     gain_scale: float = 0.2
     settling_time: float = 0.2
-    lift: Variation = _vary(0.07, 0.01)
-    reach_time: Variation = _vary(0.9, 0.05)
-    stroke_time: Variation = _vary(0.5, 0.05)
-    press_depth: Variation = _vary(0.014, 0.002)
-    dwell_time: Variation = _vary(0.25, 0.02)
-    return_time: Variation = _vary(0.4, 0.03)
+    lift: ClippedNormal = _normal(0.07, 0.01)
+    reach_time: ClippedNormal = _normal(0.9, 0.05)
+    stroke_time: ClippedNormal = _normal(0.5, 0.05)
+    press_depth: ClippedNormal = _normal(0.014, 0.002)
+    dwell_time: ClippedNormal = _normal(0.25, 0.02)
+    return_time: ClippedNormal = _normal(0.4, 0.03)
     aim_sd: float = 0.005
     firmer_depth: float = 0.005
     firmer_dwell: float = 0.06
     max_attempts: int = 4
 
     def varied(self, factor: float) -> "TeacherConfig":
-        """A teacher whose demonstrations differ `factor` times as much."""
+        """A copy with all standard deviations scaled by `factor`."""
         changed: dict[str, Any] = {"aim_sd": factor * self.aim_sd}
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            if isinstance(value, Variation):
-                changed[field.name] = Variation(value.mean, factor * value.sd)
+            if isinstance(value, ClippedNormal):
+                changed[field.name] = ClippedNormal(
+                    value.mean, factor * value.sd
+                )
         return dataclasses.replace(self, **changed)
 
     def check(self, where: str) -> None:
@@ -120,9 +129,9 @@ class TeacherConfig:
             "dwell_time",
             "return_time",
         ):
-            variation = getattr(self, name)
-            require_range(f"{where}.{name}.mean", variation.mean, 0.001, 5.0)
-            require_range(f"{where}.{name}.sd", variation.sd, 0.0, 1.0)
+            distribution = getattr(self, name)
+            require_range(f"{where}.{name}.mean", distribution.mean, 0.001, 5.0)
+            require_range(f"{where}.{name}.sd", distribution.sd, 0.0, 1.0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -130,35 +139,36 @@ class Stroke:
     """One intended motion of the hand, in the world frame.
 
     Attributes:
-        target: (3,) where the palm's centre shall come to rest on the drum, m
-            (already lower than the touching height, by the depth pressed).
-        lift: height above `target` from which the stroke begins, m.
-        times: (6,) end of each phase after the grasp, s: reach, stroke,
+        target: Lowest position of the palm's center (3,), m. It is below the
+            position at which the hand touches, by the depth of pressing.
+        lift: Height above `target` at which the stroke begins, m.
+        times: End of each phase after the grasp (6,), s: reach, stroke,
             dwell, lift off, back at the start, end.
-        tremor: (3, 3, K) amplitude, angular frequency and phase of the K
-            sines of the tremor's force, for each axis.
+        tremor: Amplitude, angular frequency and phase of the K sines of the
+            tremor's force (3, 3, K); the last but one index is the axis.
     """
 
-    target: np.ndarray
+    target: Array
     lift: float
-    times: np.ndarray
-    tremor: np.ndarray
+    times: Array
+    tremor: Array
 
 
 def draw_stroke(
     config: TeacherConfig,
-    touching: np.ndarray,
+    touching: Array,
     rng: np.random.Generator,
     attempt: int = 0,
 ) -> Stroke:
     """Draws one demonstration's stroke.
 
     Args:
-        touching: (3,) the palm's centre when the hand just touches the middle
-            of the drum's head, in the world, m.
-        rng: where the differences between demonstrations come from.
-        attempt: 0 for the first; each further one is a little more firm
-            (deeper and longer, not faster).
+        config: Parameters of the teacher.
+        touching: Position of the palm's center (3,), world frame, m, at which
+            the hand touches the center of the drum's head.
+        rng: Source of the differences between demonstrations.
+        attempt: Number of earlier attempts. Each further one is a little more
+            firm: deeper and longer, not faster.
     """
     aim = np.append(config.aim_sd * np.clip(rng.standard_normal(2), -2, 2), 0)
     depth = config.press_depth.draw(rng, 0.002) + attempt * config.firmer_depth
@@ -167,7 +177,7 @@ def draw_stroke(
     dwell = config.dwell_time.draw(rng, 0.0) + attempt * config.firmer_dwell
     lift_off = config.return_time.draw(rng, 0.2)
     ends = np.cumsum([reach, stroke, dwell, lift_off])
-    # What is left of the duration goes into the way back, most of it moving.
+    # The remaining time is for the way back; the hand rests in its last part.
     rest = max(0.3, config.duration - ends[-1])
     times = np.append(ends, [ends[-1] + 0.85 * rest, ends[-1] + rest])
     sines = 5
@@ -182,17 +192,17 @@ def draw_stroke(
     )
 
 
-def intended_position(
-    stroke: Stroke, grasp: np.ndarray, t: float
-) -> np.ndarray:
-    """Where the teacher means the palm to be.
+def intended_position(stroke: Stroke, grasp: Array, t: float) -> Array:
+    """The intended position of the palm.
 
     Args:
-        grasp: (3,) the palm's position when the teacher took hold of it, m.
-        t: time since then, s.
+        stroke: The intended motion.
+        grasp: Position of the palm at the grasp (3,), m.
+        t: Time since the grasp, s.
 
     Returns:
-        (3,) m, from minimum-jerk segments through the phases of `stroke`.
+        Position (3,), m, on minimum-jerk segments through the phases of
+        `stroke`.
     """
     above = stroke.target + np.array([0.0, 0.0, stroke.lift])
     points = (grasp, above, stroke.target, stroke.target, above, grasp, grasp)
@@ -205,7 +215,7 @@ def intended_position(
     return points[i] + blend * (points[i + 1] - points[i])
 
 
-def tremor_force(stroke: Stroke, t: float) -> np.ndarray:
+def tremor_force(stroke: Stroke, t: float) -> Array:
     """The tremor's force at time t, (3,) N."""
     amplitude, frequency, phase = stroke.tremor
     return np.sum(amplitude * np.sin(frequency * t + phase), axis=1)
@@ -213,22 +223,22 @@ def tremor_force(stroke: Stroke, t: float) -> np.ndarray:
 
 @dataclasses.dataclass
 class TeacherState:
-    """What a teacher carries from one update to the next.
+    """State of the teacher between updates.
 
     Attributes:
-        intention, intention_rate: (3,) the intended motion after the
-            teacher's bandwidth, m and m/s.
-        correction: (3,) force from watching the error, N.
-        force: (3,) on the palm, N.
+        intention: Intended position, filtered with the bandwidth (3,), m.
+        intention_rate: Rate of `intention` (3,), m/s.
+        correction: Integral part of the force (3,), N.
+        force: Force on the palm (3,), N.
     """
 
-    intention: np.ndarray
-    intention_rate: np.ndarray
-    correction: np.ndarray
-    force: np.ndarray
+    intention: Array
+    intention_rate: Array
+    correction: Array
+    force: Array
 
     @staticmethod
-    def at(grasp: np.ndarray) -> "TeacherState":
+    def at(grasp: Array) -> "TeacherState":
         """The state at the moment the palm is grasped."""
         zero = np.zeros(3)
         return TeacherState(np.array(grasp, float), zero, zero, zero)
@@ -237,23 +247,29 @@ class TeacherState:
 def advance_teacher(
     config: TeacherConfig,
     state: TeacherState,
-    goal: np.ndarray,
-    palm: np.ndarray,
-    palm_velocity: np.ndarray,
-    tremor: np.ndarray,
+    goal: Array,
+    palm: Array,
+    palm_velocity: Array,
+    tremor: Array,
     dt: float,
 ) -> TeacherState:
     """One update of the teacher's force.
 
-    The intended motion passes a critically damped filter of the teacher's
-    bandwidth (integrated exactly); the arm is a spring and damper about it;
-    the sum, tremor included, never exceeds the teacher's strength.
+    The intended motion passes a critically damped filter with the teacher's
+    bandwidth, which is integrated exactly. The force is
+
+        f = K (p_i - p) + D (ṗ_i - ṗ) + ∫ K_I (p_i - p) dt + tremor
+
+    with the filtered intention p_i and the palm p, scaled down to `max_force`.
 
     Args:
-        goal: (3,) intended position at this time, m.
-        palm, palm_velocity: (3,) of the robot's palm, m and m/s.
-        tremor: (3,) N.
-        dt: time since the last update, s.
+        config: Parameters of the teacher.
+        state: State after the last update.
+        goal: Intended position at this time (3,), m.
+        palm: Position of the palm (3,), m.
+        palm_velocity: Velocity of the palm (3,), m/s.
+        tremor: Force of the tremor (3,), N.
+        dt: Time since the last update, s.
     """
     w = 2.0 * np.pi * config.bandwidth
     offset = state.intention - goal
@@ -272,6 +288,6 @@ def advance_teacher(
     size = float(np.linalg.norm(force))
     if size > config.max_force:
         force = force * (config.max_force / size)
-        # A teacher at the limit does not wind up a larger wish.
+        # Anti-windup: at the limit the integral is kept.
         correction = state.correction
     return TeacherState(intention, rate, correction, force)

@@ -63,6 +63,24 @@ def test_without_a_stroke_nobody_pulls(teacher):
     np.testing.assert_array_equal(pulling, np.zeros(3))
 
 
+def test_an_added_teacher_acts_on_the_plant():
+    builder = DiagramBuilder()
+    plant, _ = AddMultibodyPlant(MultibodyPlantConfig(), builder)
+    world.add_world(plant, world.WorldConfig())
+    plant.Finalize()
+    teacher = KinestheticTeacher.AddToBuilder(
+        builder=builder,
+        plant=plant,
+        joint_names=NAMES,
+        config=TeacherConfig(),
+        name="person",
+    )
+    assert teacher.get_name() == "person"
+    port = plant.get_applied_spatial_force_input_port()
+    source, _ = builder.connection_map()[(plant, port.get_index())]
+    assert source is teacher
+
+
 def run(teacher, plant, q, duration):
     context = teacher.CreateDefaultContext()
     state = np.concatenate([q, np.zeros(3)])

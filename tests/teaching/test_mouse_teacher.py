@@ -186,7 +186,9 @@ def test_drakes_own_mouse_spring_pulls_the_hand():
         scene_graph=scene_graph,
         meshcat=meshcat,
         config=CONFIG,
+        name="person",
     )
+    assert teacher.get_name() == "person"
     diagram = builder.Build()
     simulator = Simulator(diagram)
     context = simulator.get_mutable_context()

@@ -11,7 +11,7 @@ from drake_affetto.common.errors import InputError
 from drake_affetto.teaching.stroke import (
     TeacherConfig,
     TeacherState,
-    Variation,
+    ClippedNormal,
     advance_teacher,
     draw_stroke,
     intended_position,
@@ -137,7 +137,7 @@ def test_a_spring_alone_holds_a_static_error_that_watching_removes():
         ("max_force", 0.0),
         ("bandwidth", float("nan")),
         ("gain_scale", 1.5),
-        ("press_depth", Variation(-0.1, 0.0)),
+        ("press_depth", ClippedNormal(-0.1, 0.0)),
     ],
 )
 def test_a_bad_configuration_is_named(field, value):
