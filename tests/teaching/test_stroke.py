@@ -9,9 +9,9 @@ import pytest
 
 from drake_affetto.common.errors import InputError
 from drake_affetto.teaching.stroke import (
+    ClippedNormal,
     TeacherConfig,
     TeacherState,
-    ClippedNormal,
     advance_teacher,
     draw_stroke,
     intended_position,
