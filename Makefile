@@ -16,15 +16,17 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint format bench clean distclean
+.PHONY: help setup demo test quick rooms lint format bench clean distclean
 
 help:
 	@echo "make demo       run the main job into out/demo"
 	@echo "make test       lint, types and all tests"
+	@echo "make quick      the tests that are not slow, without lint"
 	@echo "make setup      make or update the virtual environment .venv"
 	@echo "make lint       ruff's rules and layout, and the types"
 	@echo "make format     lay out the code and mend what ruff can mend"
 	@echo "make bench      measure the speed of the closed loop"
+	@echo "make rooms      draw the package's rooms and imports into docs/"
 	@echo "make clean      remove what was built, not .venv and not out/"
 	@echo "make distclean  remove .venv and out/ too"
 	@echo 'ARGS="..." is handed on: make demo ARGS="--seed 3 --meshcat"'
@@ -47,6 +49,14 @@ format: setup
 test: lint
 	@DRAKE_DEPRECATION_RUNTIME_SEVERITY=error \
 	    $(PYTHON) -m pytest -n $(WORKERS) --dist loadfile $(ARGS)
+
+quick: setup
+	@DRAKE_DEPRECATION_RUNTIME_SEVERITY=error \
+	    $(PYTHON) -m pytest -n $(WORKERS) --dist loadfile \
+	    -m "not slow" $(ARGS)
+
+rooms: setup
+	@$(PYTHON) tools/draw_rooms.py $(ARGS)
 
 bench: setup
 	@$(PYTHON) analysis/benchmarks/benchmark.py $(ARGS)
