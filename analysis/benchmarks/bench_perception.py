@@ -22,10 +22,10 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder
 
 from drake_affetto.experiments.camera_preview import (
-    LookTrial,
     make_sight,
     turn_to,
 )
+from drake_affetto.experiments.episode import TrialRunner
 from drake_affetto.experiments.view_maps import CHANGED_VIEWS, REFERENCE, View
 from drake_affetto.perception.blob import detect
 from drake_affetto.perception.imaging import ImageEffects
@@ -267,8 +267,8 @@ def gaze(quick: bool) -> None:
     """Time to settle, what is left, and how well τ repeats."""
     for name in (REFERENCE, "mirror"):
         scenario = load_scenario(name)
-        trial = LookTrial(scenario)
-        sight = make_sight(trial.station, trial.context)
+        trials = TrialRunner(scenario)
+        sight = make_sight(trials.station, trials.context)
         n = 2 if quick else 4
         region = scenario.drum_region
         places = np.stack(
@@ -280,12 +280,11 @@ def gaze(quick: bool) -> None:
         for xy in places:
             taus = []
             for seed in range(2 if quick else 3):
-                trial.begin(xy, seed)
-                settled, tau, elapsed = trial.finish()
-                failed += not settled
-                times.append(elapsed)
-                taus.append(tau)
-                x = trial.port("camera.blob")[0]
+                outcome = trials.gaze(xy, seed)
+                failed += not outcome.found
+                times.append(outcome.duration)
+                taus.append(outcome.task_parameter)
+                x = trials.port("camera.blob")[0]
                 box = scenario.blob.calibration
                 u = box.u_min + x * (box.u_max - box.u_min)
                 off.append(
@@ -322,7 +321,7 @@ def twin(quick: bool) -> None:
         for renderer in ("vtk", "analytic"):
             scenario = load_scenario(name)
             scenario.camera.renderer = renderer
-            trial = LookTrial(scenario)
+            trials = TrialRunner(scenario)
             rng = np.random.default_rng(3)
             region = scenario.drum_region
             taus[renderer] = []
@@ -331,9 +330,10 @@ def twin(quick: bool) -> None:
                 xy = rng.uniform(
                     [region.x[0], region.y[0]], [region.x[1], region.y[1]]
                 )
-                trial.begin(xy, seed)
-                settled, tau, _ = trial.finish()
-                taus[renderer].append(tau if settled else [np.nan] * 2)
+                outcome = trials.gaze(xy, seed)
+                taus[renderer].append(
+                    outcome.task_parameter if outcome.found else [np.nan] * 2
+                )
             costs[renderer] = time.process_time() - begin
         box = scenario.blob.calibration
         pixel = np.array([box.u_max - box.u_min, box.v_max - box.v_min])

@@ -24,14 +24,19 @@ import matplotlib.pyplot as plt
 from rich.console import Console
 
 from drake_affetto import __version__
-from drake_affetto.cli.study import (
+from drake_affetto.cli.options import (
+    STORE,
+    add_plan_arguments,
     add_study_arguments,
-    campaign,
     check_study_arguments,
+    make_plan,
+    trial_executor,
 )
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.output import atomic_path, prepare_output, write_json
-from drake_affetto.experiments.mirror import MirrorPlan, run_mirror
+from drake_affetto.experiments.mirror import run_mirror
+from drake_affetto.experiments.plans import MirrorPlan
+from drake_affetto.experiments.results import ConditionRow, ConditionsResults
 
 # Factor and value, and what that changes in the plan.
 CONDITIONS = {
@@ -48,16 +53,16 @@ def rows_of(condition, results):
     """The results of one condition, a row for each scheme and count."""
     factor, value = condition
     return [
-        {
-            "factor": factor,
-            "value": value,
-            "scheme": scheme,
-            "samples": int(count),
-            "success_rate": found["success_rate"],
-            "per_repeat": found["per_repeat"],
-        }
-        for scheme, by_count in results["schemes"].items()
-        for count, found in by_count.items()
+        ConditionRow(
+            factor,
+            value,
+            scheme,
+            count,
+            cell.success_rate,
+            cell.per_repeat,
+        )
+        for scheme, by_count in results.schemes.items()
+        for count, cell in by_count.items()
     ]
 
 
@@ -75,17 +80,17 @@ def draw(path: Path, rows, plan) -> None:
             points = [
                 row
                 for row in rows
-                if (row["factor"], row["value"], row["scheme"])
+                if (row.factor, row.value, row.scheme)
                 == (factor, value, scheme)
             ]
-            rates = [row["success_rate"] for row in points]
+            rates = [row.success_rate for row in points]
             # Side by side, so that all are seen where they are the same.
             axes.errorbar(
-                [row["samples"] + 0.12 * (i - 1) for row in points],
-                [rate["mean"] for rate in rates],
+                [row.samples + 0.12 * (i - 1) for row in points],
+                [rate.mean for rate in rates],
                 yerr=[
-                    [rate["mean"] - rate["low"] for rate in rates],
-                    [rate["high"] - rate["mean"] for rate in rates],
+                    [rate.mean - rate.low for rate in rates],
+                    [rate.high - rate.mean for rate in rates],
                 ],
                 marker="o",
                 ms=4,
@@ -110,22 +115,17 @@ def draw(path: Path, rows, plan) -> None:
 def main() -> int:
     """Runs the study and draws it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "--samples", type=int, nargs="+", default=[3, 4, 5, 8, 12]
-    )
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--evaluations", type=int, default=6)
-    parser.add_argument("--demonstrations", type=int, default=25)
+    add_plan_arguments(parser, MirrorPlan)
     add_study_arguments(parser, "out/conditions")
+    parser.set_defaults(samples=[3, 4, 5, 8, 12], repeats=3)
     args = parser.parse_args()
+    console = Console()
     try:
-        base = MirrorPlan(
+        base = make_plan(
+            MirrorPlan,
+            args,
             samples=tuple(sorted(args.samples)),
-            repeats=args.repeats,
-            evaluations=args.evaluations,
-            demonstrations=args.demonstrations,
             schemes=SCHEMES,
-            seed=args.seed,
             # Something to choose from, also for the most samples.
             pool=max(6, *args.samples) + 2,
         )
@@ -133,7 +133,7 @@ def main() -> int:
         check_study_arguments(args)
         out = prepare_output(args.out)
         rows = []
-        with campaign(args, out, Console()) as executor:
+        with trial_executor(args, out / STORE, console) as executor:
             for condition, changes in CONDITIONS.items():
                 name = ": ".join(condition)
                 plan = dataclasses.replace(base, name=name, **changes)
@@ -146,15 +146,15 @@ def main() -> int:
     draw(out / "when_transfer_wins.png", rows, base)
     write_json(
         out / "results.json",
-        {
-            "study": "conditions",
-            "version": __version__,
-            "seed": args.seed,
-            "scenario": base.scenario,
-            "repeats": base.repeats,
-            "evaluations": base.evaluations,
-            "conditions": rows,
-        },
+        ConditionsResults(
+            study="conditions",
+            version=__version__,
+            seed=base.seed,
+            scenario=base.scenario,
+            repeats=base.repeats,
+            evaluations=base.evaluations,
+            conditions=rows,
+        ),
     )
     print(out / "when_transfer_wins.png")
     return 0

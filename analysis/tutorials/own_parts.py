@@ -63,13 +63,16 @@ trials = TrialRunner(scenario)
 threshold = trials.reward_config.threshold
 taught = drum_xy + [[-0.03, 0.04], [0.03, 0.04], [0.0, -0.05]]
 policy = Neighbours(
-    tau=[trials.look(xy, seed=0).task_parameter for xy in taught],
+    tau=[trials.gaze(xy, seed=0).task_parameter for xy in taught],
     theta=[trials.teach(xy, seed=0).theta for xy in taught],
 )
 print(f"   taught by hand at {len(taught)} places")
 look, recording = trials.drum(drum_xy, policy, seed=0)
 print(f"   an unseen place is seen as tau = {look.task_parameter.round(3)}")
-tell("the average of its neighbours", trials.reward(recording, trials.taps()))
+tell(
+    "the average of its neighbors",
+    trials.reward(recording, trials.tap_prototypes()),
+)
 
 
 # %% 2. Your own motion

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from drake_affetto.cli.study import STORE
+from drake_affetto.cli.options import STORE
 from drake_affetto.common.errors import InputError
 from drake_affetto.runner.store import TrialStore
 

@@ -2,10 +2,21 @@
 
 import argparse
 from collections.abc import Sequence
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from drake_affetto.common.errors import require_range
-from drake_affetto.experiments.teaching import _SEEDS, Course, Taught, teach
+from drake_affetto.cli.options import (
+    add_plan_arguments,
+    add_study_arguments,
+    check_study_arguments,
+    make_plan,
+    trial_executor,
+)
+from drake_affetto.common.fields import check_ranges
+from drake_affetto.experiments.plans import TeachPlan
+
+if TYPE_CHECKING:
+    from drake_affetto.experiments.results import DemonstrationResult
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -14,77 +25,74 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         metavar="FILE",
         required=True,
-        help="HDF5 file of demonstrations; it is made, or added to",
+        help="HDF5 file of demonstrations; new ones are added to it",
     )
+    add_plan_arguments(parser, TeachPlan)
     parser.add_argument(
-        "--scenario",
-        default="drumming",
-        help="a scenario's name, or its YAML file",
+        "--mouse",
+        action="store_true",
+        help="you are the teacher: move the hand with the mouse in a browser",
     )
-    parser.add_argument(
-        "--positions",
-        type=int,
-        default=25,
-        metavar="N",
-        help="at how many places of the drum",
-    )
-    parser.add_argument(
-        "--seed", type=int, default=0, help="of the places and the teacher"
-    )
-    parser.add_argument(
-        "--workers",
-        type=int,
-        default=2,
-        metavar="W",
-        help="worker processes; 0 runs all in this one",
-    )
+    # Its name in version 0.1.0.
     parser.add_argument(
         "--by-hand",
+        dest="mouse",
         action="store_true",
-        help="you teach, with the mouse, in a browser",
+        default=argparse.SUPPRESS,
+        help=argparse.SUPPRESS,
     )
+    add_study_arguments(parser, None)
 
 
 def run(args: argparse.Namespace) -> int:
     """Teaches; returns the exit code."""
-    require_range("--positions", args.positions, 1, _SEEDS)
-    require_range("--seed", args.seed, 0, 2**31 - 1)
-    require_range("--workers", args.workers, 0, 256)
+    plan = make_plan(TeachPlan, args)
+    check_ranges(plan)
+    check_study_arguments(args)
 
     from rich.console import Console
 
-    console = Console()
-    course = Course(args.scenario, args.positions, args.seed, args.out)
-    try:
-        if args.by_hand:
-            from drake_affetto.experiments.mouse_teaching import teach_by_hand
+    from drake_affetto.experiments.teaching import teach
+    from drake_affetto.experiments.teaching_session import TeachingSession
 
-            taught = teach_by_hand(course, console)
+    console = Console()
+    session = TeachingSession(plan, args.out)
+    try:
+        if args.mouse:
+            from drake_affetto.experiments.mouse_teaching import teach_by_mouse
+
+            outcomes = teach_by_mouse(session, console)
         else:
-            taught = teach(course, workers=args.workers, console=console)
+
+            def executor(path: Path) -> Any:
+                return trial_executor(args, path, console)
+
+            outcomes = teach(session, executor)
     except KeyboardInterrupt:
         console.print(
-            f"{len(course.taught)} of {args.positions} positions are in "
-            f"{course.path}; the same command goes on from there."
+            f"{len(session.taught)} of {plan.demonstrations} positions are in "
+            f"{session.path}; the same command goes on from there."
         )
         raise
-    print_taught(taught, console)
-    console.print(f"{len(course.taught)} demonstrations are in {course.path}")
+    print_outcomes(outcomes, console)
+    console.print(f"{len(session.taught)} demonstrations are in {session.path}")
     return 0
 
 
-def print_taught(taught: Sequence[Taught], console: Any) -> None:
-    """Prints what came of each place, and of all."""
+def print_outcomes(
+    outcomes: Sequence["DemonstrationResult"], console: Any
+) -> None:
+    """Prints the outcome at each position, and a summary."""
     from rich.table import Table
 
-    table = Table(title="Taught by hand")
+    table = Table(title="Demonstrations")
     for name in ("", "x [m]", "y [m]", "attempts", "reward", "pull [N]", ""):
         table.add_column(name, justify="right")
-    for i, each in enumerate(taught):
+    for i, each in enumerate(outcomes):
         if not each.found:
-            came_of_it = "drum not seen"
+            outcome = "drum not seen"
         else:
-            came_of_it = "taught" if each.success else "no sound"
+            outcome = "taught" if each.success else "no sound"
         table.add_row(
             str(i + 1),
             f"{each.xy[0]:.3f}",
@@ -92,16 +100,16 @@ def print_taught(taught: Sequence[Taught], console: Any) -> None:
             str(each.attempts),
             f"{each.reward:.2f}",
             f"{each.max_pull:.1f}",
-            came_of_it,
+            outcome,
         )
     console.print(table)
-    count = len(taught)
+    count = len(outcomes)
     if count == 0:
         return
-    good = [each for each in taught if each.success]
+    good = [each for each in outcomes if each.success]
     first = sum(each.attempts == 1 for each in good)
     console.print(
         f"{len(good)} of {count} positions taught, {first} "
         f"({first / count:.0%}) at first try; greatest pull "
-        f"{max(each.max_pull for each in taught):.1f} N"
+        f"{max(each.max_pull for each in outcomes):.1f} N"
     )

@@ -14,6 +14,7 @@ import secrets
 from typing import Any
 
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.typed_json import to_plain
 
 
 def prepare_output(path: str | Path) -> Path:
@@ -101,8 +102,9 @@ def write_text_atomic(path: str | Path, text: str) -> None:
 def write_json(path: str | Path, obj: Any) -> None:
     """Writes `obj` to `path` as JSON, whole or not at all.
 
-    Numpy's arrays and scalars become lists and numbers. Keys keep their order,
-    and floats are written so that reading gives back the same number.
+    Dataclasses become objects, numpy's arrays and scalars become lists and
+    numbers. Keys keep their order, and floats are written so that reading
+    gives back the same number.
 
     Raises:
         InputError: if `path` cannot be written.
@@ -110,27 +112,21 @@ def write_json(path: str | Path, obj: Any) -> None:
             the message names its place.
         TypeError: for what has no form in JSON.
     """
-    plain = _plain(obj, "")
+    plain = to_plain(obj)
+    _require_finite(plain, "")
     text = json.dumps(plain, indent=2, allow_nan=False, ensure_ascii=False)
     write_text_atomic(path, text + "\n")
 
 
-def _plain(obj: Any, where: str) -> Any:
-    """`obj` in the standard types that JSON knows."""
-    if hasattr(obj, "tolist"):
-        obj = obj.tolist()
-    if isinstance(obj, float) and not math.isfinite(obj):
-        raise ValueError(f"{where or 'the value'} is {obj}: not for JSON")
-    if isinstance(obj, dict):
-        return {
-            str(key): _plain(value, f"{where}.{key}".lstrip("."))
-            for key, value in obj.items()
-        }
-    if isinstance(obj, (list, tuple)):
-        return [_plain(value, f"{where}[{i}]") for i, value in enumerate(obj)]
-    if isinstance(obj, os.PathLike):
-        return os.fspath(obj)
-    return obj
+def _require_finite(plain: Any, where: str) -> None:
+    if isinstance(plain, float) and not math.isfinite(plain):
+        raise ValueError(f"{where or 'the value'} is {plain}: not for JSON")
+    if isinstance(plain, dict):
+        for key, value in plain.items():
+            _require_finite(value, f"{where}.{key}".lstrip("."))
+    elif isinstance(plain, list):
+        for i, value in enumerate(plain):
+            _require_finite(value, f"{where}[{i}]")
 
 
 def _sibling(path: Path) -> Path:

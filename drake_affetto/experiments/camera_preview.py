@@ -1,18 +1,17 @@
 """`affetto look`: what the robot's camera sees, and what it makes of it."""
 
-from collections.abc import Iterator
 import dataclasses
 import itertools
 from pathlib import Path
 
 import cv2
 import numpy as np
-from pydrake.systems.analysis import ApplySimulatorConfig, Simulator
 from pydrake.systems.framework import Context
 
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.output import atomic_path
-from drake_affetto.perception import gaze as gaze_state
+from drake_affetto.common.typing import Array, Image
+from drake_affetto.experiments.episode import FRAME_PERIOD, TrialRunner
 from drake_affetto.perception.blob import BlobCalibration
 from drake_affetto.perception.camera_model import Mirror, SightModel
 from drake_affetto.perception.drawing import TRUTH, WORKSPACE, Canvas
@@ -26,9 +25,6 @@ from drake_affetto.scene import world
 from drake_affetto.station.scenario import Scenario
 from drake_affetto.station.station import AffettoStation
 
-Array = np.ndarray
-
-_FRAME_RATE = 20.0  # of the video
 _CALIBRATION_GRID = 9  # positions along each side of the drum's region
 
 
@@ -125,7 +121,7 @@ def turn_to(station: AffettoStation, context: Context, yaw: float) -> None:
 
 
 def draw_view(
-    image: Array, pixels: Array, sight: Sight, yaw: float, scenario: Scenario
+    image: Image, pixels: Array, sight: Sight, yaw: float, scenario: Scenario
 ) -> Canvas:
     """An image with blob, calibration grid and the drum's region.
 
@@ -171,7 +167,7 @@ def calibration_yaml(box: BlobCalibration) -> str:
     return "\n".join(lines)
 
 
-def write_image(path: Path, image: Array) -> None:
+def write_image(path: Path, image: Image) -> None:
     """Writes an RGB image (h, w, 3) of uint8 as PNG."""
     with atomic_path(path) as fresh:
         if not cv2.imwrite(str(fresh), np.ascontiguousarray(image[..., ::-1])):
@@ -181,142 +177,53 @@ def write_image(path: Path, image: Array) -> None:
 def write_gaze_video(
     path: Path, scenario: Scenario, xy: Array, seed: int
 ) -> None:
-    """Simulates the gaze servo looking for a drum at xy; writes an MP4.
+    """Simulates the gaze servo searching for a drum at xy; writes an MP4.
 
     Raises:
-        InputError: if the file cannot be written.
+        InputError: If the file cannot be written.
     """
-    trial = LookTrial(scenario)
+    trials = TrialRunner(scenario)
     camera = scenario.camera
     scale = 3
     with atomic_path(path) as fresh:
         writer = cv2.VideoWriter(
             str(fresh),
             cv2.VideoWriter.fourcc(*"mp4v"),
-            _FRAME_RATE,
+            1.0 / FRAME_PERIOD,
             (scale * camera.width, scale * camera.height),
         )
         if not writer.isOpened():
             raise InputError(f"cannot write {path}: no MP4 encoder")
+
+        def film(elapsed: float) -> None:
+            image = _gaze_frame(trials, sight, elapsed)
+            writer.write(np.ascontiguousarray(image[..., ::-1]))
+
         try:
-            trial.begin(xy, seed)
-            for image in _gaze_frames(trial):
-                writer.write(np.ascontiguousarray(image[..., ::-1]))
+            sight = make_sight(trials.station, trials.context)
+            trials.gaze(xy, seed, film, linger=1.0)
         finally:
             writer.release()
 
 
-class _Rest:
-    """A skill that does not move: θ = 0."""
-
-    def __init__(self, size: int) -> None:
-        self._size = size
-
-    def predict(self, X: Array) -> Array:
-        return np.zeros((len(X), self._size))
-
-
-class LookTrial:
-    """The station looking for a drum, and nothing else."""
-
-    def __init__(self, scenario: Scenario) -> None:
-        """Builds the station; see `AffettoStation` for what is raised."""
-        self.scenario = scenario
-        self.station = AffettoStation(scenario)
-        self.context = self.station.CreateDefaultContext()
-        self.simulator = Simulator(self.station, self.context)
-        ApplySimulatorConfig(scenario.simulator_config, self.simulator)
-        self._settled: Context | None = None
-        self._begin = 0.0
-
-    def begin(self, xy: Array, seed: int) -> None:
-        """Starts to look for the drum at xy (2,), robot at rest."""
-        station = self.station
-        if self._settled is None:
-            self.simulator.Initialize()
-            self.simulator.AdvanceTo(self.scenario.settling_duration)
-            self._settled = self.context.Clone()
-        self.context.SetTimeStateAndParametersFrom(self._settled)
-        self._begin = self.context.get_time()
-        station.set_drum_position(self.context, xy)
-        n = station.num_joints * self.scenario.dmp.n_basis
-        station.policy.set_regressor(
-            station.policy.GetMyMutableContextFromRoot(self.context), _Rest(n)
-        )
-        station.gaze.set_enabled(
-            station.gaze.GetMyMutableContextFromRoot(self.context), True
-        )
-        station.camera.set_seed(
-            station.camera.GetMyMutableContextFromRoot(self.context), seed
-        )
-        self.simulator.Initialize()
-
-    @property
-    def elapsed(self) -> float:
-        """Time [s] since the look began."""
-        return self.context.get_time() - self._begin
-
-    def advance(self, duration: float) -> None:
-        """Goes on for `duration` s."""
-        self.simulator.AdvanceTo(self.context.get_time() + duration)
-
-    def port(self, name: str) -> Array:
-        """The value of a port of the station."""
-        return self.station.GetOutputPort(name).Eval(self.context)
-
-    @property
-    def yaw(self) -> float:
-        """The yaw joint's angle [rad]."""
-        index = self.station.joints.names.index(self.scenario.yaw_joint)
-        return float(self.port("affetto.estimated_state")[index])
-
-    @property
-    def phase(self) -> GazePhase:
-        """Where the gaze servo stands."""
-        servo = self.station.gaze.GetMyContextFromRoot(self.context)
-        state = servo.get_discrete_state(0).CopyToVector()
-        return GazePhase(int(state[gaze_state.PHASE]))
-
-    def finish(self) -> tuple[bool, Array, float]:
-        """Runs until settled or failed.
-
-        Returns:
-            Whether it settled, τ (2,), and the time it took [s].
-        """
-        while self.phase not in (GazePhase.SETTLED, GazePhase.FAILED):
-            self.advance(0.02)
-        return (
-            self.phase == GazePhase.SETTLED,
-            self.port("affetto.task_parameter"),
-            self.elapsed,
-        )
-
-
-def _gaze_frames(trial: LookTrial) -> Iterator[Array]:
-    """Images of a look, until a second after it has settled."""
-    sight = make_sight(trial.station, trial.context)
-    end = trial.scenario.gaze.timeout + 2.0
-    while trial.elapsed < end:
-        trial.advance(1.0 / _FRAME_RATE)
-        image = trial.station.GetOutputPort("camera.color_image").Eval(
-            trial.context
-        )
-        canvas = draw_view(
-            image.data,
-            trial.port("camera.blob_pixels"),
-            sight,
-            trial.yaw,
-            trial.scenario,
-        )
-        canvas.cross(sight.model.camera.image_center, TRUTH, size=4.0)
-        phase = trial.phase
-        canvas.text(
-            f"{trial.elapsed:4.2f} s  {phase.name.lower()}  "
-            f"yaw {trial.yaw:+.3f}",
-            (4.0, 12.0),
-        )
-        if phase in (GazePhase.SETTLED, GazePhase.FAILED):
-            end = min(end, trial.elapsed + 1.0)
-            tau = trial.port("affetto.task_parameter")
-            canvas.text(f"tau {tau[0]:.3f}, {tau[1]:+.3f}", (4.0, 24.0))
-        yield canvas.image
+def _gaze_frame(trials: TrialRunner, sight: Sight, elapsed: float) -> Image:
+    """The camera's image at one moment of a search, with what it found."""
+    scenario = trials.scenario
+    index = trials.station.joints.names.index(scenario.yaw_joint)
+    yaw = float(trials.port("affetto.estimated_state")[index])
+    canvas = draw_view(
+        trials.port("camera.color_image").data,
+        trials.port("camera.blob_pixels"),
+        sight,
+        yaw,
+        scenario,
+    )
+    canvas.cross(sight.model.camera.image_center, TRUTH, size=4.0)
+    phase = trials.gaze_phase
+    canvas.text(
+        f"{elapsed:4.2f} s  {phase.name.lower()}  yaw {yaw:+.3f}", (4.0, 12.0)
+    )
+    if phase in (GazePhase.SETTLED, GazePhase.FAILED):
+        tau = trials.port("affetto.task_parameter")
+        canvas.text(f"tau {tau[0]:.3f}, {tau[1]:+.3f}", (4.0, 24.0))
+    return canvas.image

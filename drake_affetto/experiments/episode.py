@@ -1,11 +1,11 @@
-"""One trial at a time: look for the drum, be taught, play, drum.
+"""One trial at a time: gaze, guided movement, strike, the whole chain.
 
 Each trial runs the whole station. A `TrialRunner` builds its Diagram once;
 trials change the context only, and what a trial gives depends on its
 arguments alone, not on the trials before it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import dataclasses
 
 import numpy as np
@@ -18,7 +18,10 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
+from drake_affetto.common.typing import Array
 from drake_affetto.motion.dmp import Dmp
+from drake_affetto.perception import gaze as gaze_state
+from drake_affetto.perception.gaze import GazePhase
 from drake_affetto.skill.policy import Regressor
 from drake_affetto.sound.config import load_sound_config
 from drake_affetto.sound.reward import (
@@ -32,66 +35,70 @@ from drake_affetto.station.scenario import Scenario
 from drake_affetto.station.station import AffettoStation
 from drake_affetto.teaching.stroke import draw_stroke
 
-# How long after a movement is listened: a struck drum rings on.
+# Time after a movement that is recorded too, s: a struck drum rings on.
 _RINGING = 0.3
+
+# Steps in which a search with the gaze is simulated, s.
+FRAME_PERIOD = 0.05
 
 
 @dataclasses.dataclass
-class Look:
-    """What came of looking for the drum.
+class GazeOutcome:
+    """The outcome of a search for the drum with the gaze.
 
     Attributes:
-        found: whether the gaze settled on the marker.
-        task_parameter: (2,) τ or τ̂; zeros where it did not.
-        duration: how long it took, s.
+        found: Whether the gaze settled on the marker.
+        task_parameter: τ or τ̂ (2,); zeros if it did not settle.
+        duration: Time that the search took, s.
     """
 
     found: bool
-    task_parameter: np.ndarray
+    task_parameter: Array
     duration: float
 
 
 @dataclasses.dataclass
 class Recording:
-    """What was recorded while the robot moved.
+    """The recording of a movement.
 
     Attributes:
-        t: (T,) times of the contacts since the movement's start, s.
-        contact_force: (T, 2) N on the head and m from its centre.
-        knock_force: (T, 2) N on the shell and on the table.
-        joint_t: (S,) times of the joints, s.
-        joint_state: (S, 2n) rad, rad/s.
-        desired_state: (S, 2n) rad, rad/s.
-        chamber_pressure: (S, 2n) Pa absolute.
-        sound: (samples,) Pa at the microphone.
-        sound_rate: samples per second.
+        t: Times of the contacts since the movement's start (T,), s.
+        contact_force: Force on the head, N, and distance of the contact from
+            its center, m (T, 2).
+        knock_force: Forces on the shell and on the table (T, 2), N.
+        joint_t: Times of the joints (S,), s.
+        joint_state: Angles and speeds (S, 2n), rad, rad/s.
+        desired_state: Desired angles and speeds (S, 2n), rad, rad/s.
+        chamber_pressure: Absolute pressures (S, 2n), Pa.
+        sound: Sound pressure at the microphone (samples,), Pa.
+        sound_rate: Sampling rate of the sound, 1/s.
     """
 
-    t: np.ndarray
-    contact_force: np.ndarray
-    knock_force: np.ndarray
-    joint_t: np.ndarray
-    joint_state: np.ndarray
-    desired_state: np.ndarray
-    chamber_pressure: np.ndarray
-    sound: np.ndarray
+    t: Array
+    contact_force: Array
+    knock_force: Array
+    joint_t: Array
+    joint_state: Array
+    desired_state: Array
+    chamber_pressure: Array
+    sound: Array
     sound_rate: float
 
 
 @dataclasses.dataclass
-class Lesson:
-    """One demonstration by hand (paper Eq. 8).
+class GuidedMovement:
+    """One movement of the arm that a teacher guided (paper Eq. 8).
 
     Attributes:
-        t: (T,) s since the palm was grasped.
-        q: (T, n) recorded joint angles, rad.
-        theta: (n·K,) the movement primitive that was encoded from them.
-        max_pull: greatest force of the teacher, N.
+        t: Times since the palm was grasped (T,), s.
+        q: Recorded joint angles (T, n), rad.
+        theta: Movement primitive that was encoded from them (n·K,).
+        max_pull: Greatest force of the teacher, N.
     """
 
-    t: np.ndarray
-    q: np.ndarray
-    theta: np.ndarray
+    t: Array
+    q: Array
+    theta: Array
     max_pull: float
 
 
@@ -110,9 +117,13 @@ class TrialRunner:
         """Builds the station; see `AffettoStation` for what is raised.
 
         Args:
-            by_mouse: whoever drags the hand in `meshcat` teaches.
-            start_time: a whole number of seconds; from when the robot comes
-                to rest, for replays of several trials one after another.
+            scenario: Scenario of the trials.
+            meshcat: Browser window that shows them; None for none.
+            meshcat_params: How they are shown.
+            start_time: Whole number of seconds at which the robot comes to
+                rest, for replays of several trials one after another.
+            by_mouse: Whether a person who drags the hand in `meshcat` is the
+                teacher.
         """
         self.scenario = scenario
         self._start_time = start_time
@@ -154,56 +165,77 @@ class TrialRunner:
         self.meshcat = meshcat
         self._settled: Context | None = None
 
-    def taps(self) -> list[np.ndarray]:
-        """Prototypes of what the drum sounds like when a person taps it."""
+    def tap_prototypes(self) -> list[Array]:
+        """Prototypes of the drum's sound when a person taps it."""
         return tap_prototypes(self.voice, self.reward_config)
 
-    def spectrogram(self, recording: Recording) -> np.ndarray:
+    def spectrogram(self, recording: Recording) -> Array:
         """(bands, frames) of a recording's sound."""
         return spectrogram(
             recording.sound, recording.sound_rate, self.reward_config
         )
 
     def reward(
-        self, recording: Recording, prototypes: Sequence[np.ndarray]
+        self, recording: Recording, prototypes: Sequence[Array]
     ) -> float:
         """R of paper Eq. 10, from the sound alone."""
         return reward(self.spectrogram(recording), prototypes)
 
-    def prototype(self, recording: Recording) -> np.ndarray:
+    def prototype(self, recording: Recording) -> Array:
         """The recording's loudest moment, as a prototype for rewards."""
         return cut_prototype(self.spectrogram(recording), self.reward_config)
 
-    def look(self, xy: np.ndarray, seed: int) -> Look:
-        """Looks for the drum at xy (2,), m.
+    def gaze(
+        self,
+        xy: Array,
+        seed: int,
+        on_frame: Callable[[float], None] | None = None,
+        linger: float = 0.0,
+    ) -> GazeOutcome:
+        """Searches for the drum at xy with the gaze.
 
         Args:
-            seed: of the camera's noise.
+            xy: Position of the drum (2,), m.
+            seed: Seed of the camera's noise.
+            on_frame: Called every 0.05 s with the time since the beginning,
+                e.g. to film the search.
+            linger: Time for which the simulation goes on after the end of the
+                search, s.
         """
         begin = self._start(xy)
-        # Looking only: nothing is played within any trial's time.
+        # The gaze alone: no movement starts within any trial's time.
         self.station.policy.set_policy_parameters(
             self._sub(self.station.policy),
             np.zeros(self.station.num_joints * self.dmp.n_basis),
             begin + 1e6,
         )
-        self._watch(seed)
-        return self._wait_for_gaze(begin)
+        self._enable_gaze(seed)
+        outcome = self._wait_for_gaze(begin, on_frame)
+        end = self.context.get_time() + linger
+        while self.context.get_time() < end - 1e-9:
+            self._advance_frame(begin, on_frame)
+        return outcome
+
+    @property
+    def gaze_phase(self) -> GazePhase:
+        """The present state of the gaze servo."""
+        state = self._sub(self.station.gaze).get_discrete_state(0)
+        return GazePhase(int(state.CopyToVector()[gaze_state.PHASE]))
 
     def teach(
         self,
-        xy: np.ndarray,
+        xy: Array,
         seed: int,
         attempt: int = 0,
         variability: float = 1.0,
-    ) -> Lesson:
-        """Guides the arm to the drum at xy (2,), m, and back.
+    ) -> GuidedMovement:
+        """Guides the arm to the drum at xy and back, as a simulated teacher.
 
         Args:
-            seed: of what differs between demonstrations.
-            attempt: how often this position was tried before.
-            variability: by how much more than the scenario says
-                demonstrations differ.
+            xy: Position of the drum (2,), m.
+            seed: Seed of the teacher's variation.
+            attempt: Number of earlier attempts at this position.
+            variability: Factor of the teacher's variation.
         """
         teaching = self.scenario.teaching.varied(variability)
         station = self.station
@@ -215,13 +247,13 @@ class TrialRunner:
             attempt,
         )
         station.teacher.set_stroke(self._sub(station.teacher), stroke, grasped)
-        return self._write_lesson(grasped)
+        return self._record_guidance(grasped)
 
-    def _soften(self, xy: np.ndarray) -> float:
-        """Lets the arm be led, drum at xy (paper Eq. 8); returns the time."""
+    def _soften(self, xy: Array) -> float:
+        """Makes the arm compliant (paper Eq. 8); returns the time, s."""
         teaching, station = self.scenario.teaching, self.station
         begin = self._start(xy)
-        # What holds the arm at rest will hold it while it is led.
+        # What holds the arm at rest will hold it while it is guided.
         self._advance(begin + teaching.settling_time)
         u_eq = self._log("affetto.pid_output")[1].mean(axis=0)
         controller = self._sub(station.controller)
@@ -232,26 +264,28 @@ class TrialRunner:
         station.set_equilibrium_offset(self.context, u_eq)
         return begin + teaching.settling_time
 
-    def _write_lesson(self, grasped: float) -> Lesson:
-        """Records what the hand is led through from `grasped` on, s."""
+    def _record_guidance(self, grasped: float) -> GuidedMovement:
+        """Records the guided movement from the time `grasped` on, s."""
         self._clear_logs()
         self._advance(grasped + self.scenario.teaching.duration)
         t, state = self._log("affetto.estimated_state")
         _, pull = self._log("teacher.pulling_force")
         t = t - grasped
         q = state[:, : self.station.num_joints]
-        return Lesson(
+        return GuidedMovement(
             t=t,
             q=q,
             theta=self.dmp.encode(t, q),
             max_pull=float(np.linalg.norm(pull, axis=1).max()),
         )
 
-    def play(self, xy: np.ndarray, theta: np.ndarray, seed: int) -> Recording:
-        """Plays θ (n·K,) with the drum at xy (2,), m.
+    def strike(self, xy: Array, theta: Array, seed: int) -> Recording:
+        """Executes a movement, without the gaze.
 
         Args:
-            seed: of the microphone's noise.
+            xy: Position of the drum (2,), m.
+            theta: Parameters θ of the movement (n·K,).
+            seed: Seed of the microphone's noise.
         """
         begin = self._start(xy)
         start = begin + self.scenario.policy.delay
@@ -261,32 +295,33 @@ class TrialRunner:
         return self._record(start, seed)
 
     def drum(
-        self, xy: np.ndarray, regressor: Regressor, seed: int
-    ) -> tuple[Look, Recording | None]:
-        """The whole chain: finds the drum at xy (2,), m, and plays.
+        self, xy: Array, regressor: Regressor, seed: int
+    ) -> tuple[GazeOutcome, Recording | None]:
+        """The whole chain: the gaze finds the drum, the skill strikes it.
 
         Args:
-            regressor: the skill, from task parameters to θ.
-            seed: of the camera's and the microphone's noise.
+            xy: Position of the drum (2,), m.
+            regressor: Skill, from task parameters to θ.
+            seed: Seed of the camera's and the microphone's noise.
 
         Returns:
-            What was seen, and what was recorded (None where the drum was not
-            found).
+            The outcome of the gaze, and the recording (None if the drum was
+            not found).
         """
         begin = self._start(xy)
         policy = self._sub(self.station.policy)
         self.station.policy.set_regressor(policy, regressor)
-        self._watch(seed)
-        look = self._wait_for_gaze(begin)
-        if not look.found:
-            return look, None
+        self._enable_gaze(seed)
+        outcome = self._wait_for_gaze(begin)
+        if not outcome.found:
+            return outcome, None
         limit = begin + self.scenario.gaze.timeout + 5.0
         while not self.station.policy.is_latched(policy):
             if self.context.get_time() > limit:
                 raise RuntimeError("the gaze has settled but is never ready")
             self._advance(self.context.get_time() + 0.05)
         start = float(self.port("affetto.start_time")[0])
-        return look, self._record(start, seed)
+        return outcome, self._record(start, seed)
 
     def port(self, name: str):
         """The value now of the station's output port `name`."""
@@ -299,8 +334,8 @@ class TrialRunner:
     def _sub(self, system) -> Context:
         return system.GetMyMutableContextFromRoot(self.context)
 
-    def _start(self, xy: np.ndarray) -> float:
-        """Robot settled at its start posture, drum at xy; returns the time."""
+    def _start(self, xy: Array) -> float:
+        """Settles the robot, drum at xy; returns the time, s."""
         if self._settled is None:
             station = self.station
             station.reset(self._station_context)
@@ -314,18 +349,20 @@ class TrialRunner:
         self.simulator.Initialize()
         return self.context.get_time()
 
-    def _watch(self, seed: int) -> None:
+    def _enable_gaze(self, seed: int) -> None:
         gaze, camera = self.station.gaze, self.station.camera
         gaze.set_enabled(self._sub(gaze), True)
         camera.set_seed(self._sub(camera), seed)
 
-    def _wait_for_gaze(self, begin: float) -> Look:
+    def _wait_for_gaze(
+        self, begin: float, on_frame: Callable[[float], None] | None = None
+    ) -> GazeOutcome:
         gaze, context = self.station.gaze, self._sub(self.station.gaze)
         settled = gaze.get_settled_output_port()
         failed = gaze.GetOutputPort("failed")
         while not settled.Eval(context)[0] and not failed.Eval(context)[0]:
-            self._advance(self.context.get_time() + 0.05)
-        return Look(
+            self._advance_frame(begin, on_frame)
+        return GazeOutcome(
             found=bool(settled.Eval(context)[0]),
             task_parameter=np.array(
                 gaze.get_task_parameter_output_port().Eval(context)
@@ -333,8 +370,15 @@ class TrialRunner:
             duration=self.context.get_time() - begin,
         )
 
+    def _advance_frame(
+        self, begin: float, on_frame: Callable[[float], None] | None
+    ) -> None:
+        self._advance(self.context.get_time() + FRAME_PERIOD)
+        if on_frame is not None:
+            on_frame(self.context.get_time() - begin)
+
     def _record(self, start: float, seed: int) -> Recording:
-        """Simulates the movement that starts at `start`; listens to it."""
+        """Simulates the movement that starts at `start`, with its sound."""
         self._advance(start)
         self._clear_logs()
         self._advance(start + self.scenario.dmp.duration + _RINGING)
@@ -368,7 +412,7 @@ class TrialRunner:
         if time > self.context.get_time():
             self.simulator.AdvanceTo(time)
 
-    def _log(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+    def _log(self, name: str) -> tuple[Array, Array]:
         """Times (T,) and values (T, size) of a log, each time once."""
         log = self._logs[name].FindLog(self.context)
         t = log.sample_times()

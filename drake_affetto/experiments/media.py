@@ -1,4 +1,4 @@
-"""What the demo shows a person: pictures, sounds and a replay to turn round.
+"""Media of a study: pictures, sounds and a 3D replay of trials.
 
 The trials shown are run here once more, in this process and with Meshcat
 recording them; they are the same simulations that the results come from.
@@ -11,11 +11,16 @@ import cv2
 import matplotlib
 from matplotlib.figure import Figure
 import numpy as np
+from numpy.typing import ArrayLike
 from pydrake.geometry import Meshcat, MeshcatParams, MeshcatVisualizerParams
 
 from drake_affetto.common.output import atomic_path, write_bytes_atomic
-from drake_affetto.experiments.episode import Look, Recording, TrialRunner
-from drake_affetto.scene.view import stand_before
+from drake_affetto.experiments.episode import (
+    GazeOutcome,
+    Recording,
+    TrialRunner,
+)
+from drake_affetto.scene.view import set_default_camera_pose
 from drake_affetto.skill.policy import Regressor
 from drake_affetto.sound.voice import write_wav
 from drake_affetto.station.scenario import Scenario
@@ -26,26 +31,26 @@ _PAUSE = 1.0
 
 
 @dataclasses.dataclass
-class Exhibit:
+class ShownTrial:
     """A trial to show.
 
     Attributes:
-        name: of the trial, in file names and in the replay's scene tree.
-        scenario: what it happens in.
-        skill: the regressor that is used.
-        xy: (2,) where the drum stands, m.
+        name: Name of the trial, in file names and in the replay's scene tree.
+        scenario: Scenario of the trial.
+        skill: Regressor from task parameters to movements.
+        xy: Position of the drum (2,), m.
     """
 
     name: str
     scenario: Scenario
     skill: Regressor
-    xy: np.ndarray
+    xy: ArrayLike
 
 
-def write_exhibits(
+def write_media(
     out: Path,
-    direct: Exhibit,
-    mirror: Exhibit,
+    direct: ShownTrial,
+    mirror: ShownTrial,
     prototypes: list[np.ndarray],
     seed: int,
 ) -> None:
@@ -55,61 +60,62 @@ def write_exhibits(
     the other end of its region.
 
     Args:
-        out: an existing folder.
-        direct, mirror: the two trials of the replay.
-        prototypes: of the reward in the figure's title.
-        seed: of the noise.
+        out: Folder, which exists.
+        direct: First trial of the replay.
+        mirror: Second trial of the replay.
+        prototypes: Prototypes of the reward in the figure's title.
+        seed: Seed of the noise.
     """
     meshcat = Meshcat(MeshcatParams(host="localhost"))
-    stand_before(meshcat)
+    set_default_camera_pose(meshcat)
     meshcat.StartRecording(
         frames_per_second=_FRAMES_PER_SECOND,
         set_visualizations_while_recording=False,
     )
     begin = 0.0
     shown = []
-    for exhibit in (direct, mirror):
+    for trial in (direct, mirror):
         trials = TrialRunner(
-            exhibit.scenario,
+            trial.scenario,
             meshcat,
             MeshcatVisualizerParams(
-                prefix=exhibit.name,
+                prefix=trial.name,
                 publish_period=1.0 / _FRAMES_PER_SECOND,
             ),
             start_time=begin,
         )
-        look, recording = trials.drum(exhibit.xy, exhibit.skill, seed)
+        gaze, recording = trials.drum(np.asarray(trial.xy), trial.skill, seed)
         end = trials.context.get_time()
-        shown.append((exhibit, trials, look, recording, begin, end))
+        shown.append((trial, trials, gaze, recording, begin, end))
         begin = float(np.ceil(end + _PAUSE))
-    for exhibit, _, _, _, first, last in shown:
-        path = f"/drake/{exhibit.name}"
+    for trial, _, _, _, first, last in shown:
+        path = f"/drake/{trial.name}"
         meshcat.SetProperty(path, "visible", first == 0.0, 0.0)
         meshcat.SetProperty(path, "visible", True, first)
-        if exhibit is not mirror:
+        if trial is not mirror:
             meshcat.SetProperty(path, "visible", False, last + 0.9 * _PAUSE)
     meshcat.StopRecording()
     meshcat.PublishRecording()
     write_bytes_atomic(out / "replay.html", meshcat.StaticHtml().encode())
 
-    for exhibit, trials, look, _, _, _ in shown:
-        if look.found and trials.look(exhibit.xy, seed).found:
-            draw_view(out / f"camera_{exhibit.name}.png", trials)
-    _, trials, look, hit, _, _ = shown[0]
+    for trial, trials, gaze, _, _, _ in shown:
+        if gaze.found and trials.gaze(np.asarray(trial.xy), seed).found:
+            draw_view(out / f"camera_{trial.name}.png", trials)
+    _, trials, gaze, hit, _, _ = shown[0]
     if hit is None:
         return
     _write_sound(out / "hit.wav", hit)
     region = direct.scenario.drum_region
     low = np.array([region.x[0], region.y[0]])
     high = np.array([region.x[1], region.y[1]])
-    far = np.where(direct.xy > 0.5 * (low + high), low, high)
-    theta = direct.skill.predict(look.task_parameter[None, :])
-    miss = trials.play(far, np.ravel(theta), seed)
+    far = np.where(np.asarray(direct.xy) > 0.5 * (low + high), low, high)
+    theta = direct.skill.predict(gaze.task_parameter[None, :])
+    miss = trials.strike(far, np.ravel(theta), seed)
     _write_sound(out / "miss.wav", miss)
     draw_trial(
         out / "trial.png",
         trials,
-        look,
+        gaze,
         hit,
         trials.reward(hit, prototypes),
     )
@@ -165,7 +171,7 @@ def draw_view(path: Path, trials: TrialRunner) -> None:
 def draw_trial(
     path: Path,
     trials: TrialRunner,
-    look: Look,
+    gaze: GazeOutcome,
     recording: Recording,
     reward: float,
 ) -> None:
@@ -174,17 +180,17 @@ def draw_trial(
     n = len(names)
     figure = Figure(figsize=(11, 10), layout="constrained")
     axes = figure.subplots(4, 1, sharex=True)
-    colours = matplotlib.colormaps["tab10"](np.arange(n) % 10)
+    colors = matplotlib.colormaps["tab10"](np.arange(n) % 10)
     t = recording.joint_t
     angle = np.degrees(recording.joint_state[:, :n])
     desired = np.degrees(recording.desired_state[:, :n])
     pressure = recording.chamber_pressure / 1e3
     for i, name in enumerate(names):
         label = name.replace("_", " ")
-        axes[0].plot(t, angle[:, i], color=colours[i], label=label)
-        axes[0].plot(t, desired[:, i], color=colours[i], ls=":", lw=1)
-        axes[1].plot(t, pressure[:, i], color=colours[i])
-        axes[1].plot(t, pressure[:, n + i], color=colours[i], ls="--", lw=1)
+        axes[0].plot(t, angle[:, i], color=colors[i], label=label)
+        axes[0].plot(t, desired[:, i], color=colors[i], ls=":", lw=1)
+        axes[1].plot(t, pressure[:, i], color=colors[i])
+        axes[1].plot(t, pressure[:, n + i], color=colors[i], ls="--", lw=1)
     axes[0].set_ylabel("joint angle [°]\n(dotted: desired)")
     axes[0].legend(ncols=4, fontsize=8, loc="upper center")
     low, high = axes[0].get_ylim()
@@ -205,7 +211,7 @@ def draw_trial(
         axis.grid(alpha=0.3)
         axis.margins(x=0.01)
     verdict = "hit" if reward > trials.reward_config.threshold else "miss"
-    tau = ", ".join(f"{value:.3f}" for value in look.task_parameter)
+    tau = ", ".join(f"{value:.3f}" for value in gaze.task_parameter)
     figure.suptitle(
         f"One trial: task parameter [{tau}], reward {reward:.2f} ({verdict})"
     )

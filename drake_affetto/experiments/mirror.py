@@ -1,12 +1,12 @@
-"""`affetto mirror`: a learned skill in a changed view (paper Fig. 5).
+"""A learned skill in a changed view (paper Fig. 5).
 
-The skill has been learned with the drum in direct view. Now it is seen in the
-mirror, or with a camera that was moved; a few demonstrations are given there,
-each scheme makes of them what it can, and drums at unseen positions. Every
-trial is simulated in full and judged by its sound.
+The skill has been learned with the drum in direct view. Now the drum is seen
+in the mirror, or with a camera that was moved. A few demonstrations are given
+there, each scheme learns from them in its own way, and drums at test
+positions. Every trial is simulated in full and judged by its sound.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import dataclasses
 from pathlib import Path
 from typing import Any
@@ -14,105 +14,98 @@ from typing import Any
 import numpy as np
 
 from drake_affetto import __version__
-from drake_affetto.common.errors import require, require_range
 from drake_affetto.experiments.drumming import HIDDEN, SOURCE
+from drake_affetto.experiments.plans import MirrorPlan
+from drake_affetto.experiments.results import (
+    DemonstrationResult,
+    GazeResult,
+    MirrorResults,
+    SchemeCell,
+    SchemeComparisonRow,
+    StrikeResult,
+    TransferMap,
+)
 from drake_affetto.experiments.skills import (
     fit_scheme,
     learn_skill,
+    look_at_positions,
     stack_prototypes,
-    teach_places,
+    task_parameters,
+    teach_positions,
 )
 from drake_affetto.experiments.statistics import compare, success_rate
 from drake_affetto.experiments.trials import (
     draw_positions,
-    look,
+    run_trials,
     strike,
     trial_seed,
 )
-from drake_affetto.runner.executor import Result, Spec, TrialExecutor
+from drake_affetto.runner.executor import Spec, TrialExecutor
 from drake_affetto.station.scenario import load_scenario
 
 # What the seeds of this study are for; the skill's are those of the drum study.
 _TARGET, _TESTS, _CHOICE, _LOOKS, _STRIKES = range(100, 105)
 
-# (i) to (iv) of the paper, then (v) the library's default and (vi) a Gaussian
-# process on the few samples.
-SCHEMES = (
-    "unchanged",
-    "relearn",
-    "continue",
-    "transfer",
-    "transfer_default",
-    "gaussian_process",
-)
-
-# A map's grid in the report.
+# Points along each side of the map's grid in the results.
 _GRID = 11
 
 
-@dataclasses.dataclass(frozen=True)
-class MirrorPlan:
-    """What is compared, and how often.
+@dataclasses.dataclass
+class MirrorOutcome:
+    """What the study found, and what of its first repeat can be shown.
 
     Attributes:
-        scenario: of the changed view, by name or path.
-        samples: numbers of demonstrations the schemes are given.
-        repeats: how often all of it is done, each time with another skill,
-            other demonstrations and other positions.
-        evaluations: unseen positions of a repeat.
-        demonstrations: from which the skill is learned in direct view.
-        pool: demonstrations in the changed view, from which samples are drawn;
-            None for the paper's 6, or as many as the most samples.
-        schemes: which of `SCHEMES`.
-        choice: how samples are chosen, at "random" or "spread" out.
-        variability: how much more than the scenario says the teacher varies.
-        workspace: share of the region's length and width that is used.
-        direct: the scenario in which the skill is learned.
-        name: of this plan among others in one store; it is shown.
-        seed: of everything that is random.
+        results: Content of results.json.
+        skill: Source skill of the first repeat.
+        schemes: Schemes of the first repeat by name, fitted with the most
+            samples.
+        prototypes: Prototypes of the reward (N, bands, frames).
+        demonstrations: Demonstrations that these schemes were given.
+        positions: Test positions of the first repeat (evaluations, 2), m.
+        seen: What the gaze found at these positions.
     """
 
-    scenario: str = "mirror"
-    samples: tuple[int, ...] = (3, 4, 5)
-    repeats: int = 10
-    evaluations: int = 6
-    demonstrations: int = 25
-    pool: int | None = None
-    schemes: tuple[str, ...] = SCHEMES
-    choice: str = "random"
-    variability: float = 1.0
-    workspace: float = 1.0
-    direct: str = "drumming"
-    name: str = ""
-    seed: int = 0
+    results: MirrorResults
+    skill: Any
+    schemes: dict[str, Any]
+    prototypes: np.ndarray
+    demonstrations: list[DemonstrationResult]
+    positions: np.ndarray
+    seen: list[GazeResult]
 
-    @property
-    def pool_size(self) -> int:
-        """How many demonstrations there are to choose from."""
-        return max(6, *self.samples) if self.pool is None else self.pool
 
-    def check(self) -> None:
-        """Raises InputError for the first number that does not fit."""
-        require_range("--repeats", self.repeats, 1, 1000)
-        require_range("--evaluations", self.evaluations, 1, 1000)
-        require_range("--demonstrations", self.demonstrations, 3, 1000)
-        for number in self.samples:
-            require_range("--samples", number, 2, 100)
-        require(
-            len(set(self.samples)) == len(self.samples) > 0,
-            "--samples",
-            list(self.samples),
-            "numbers of samples, each once",
-        )
-        require_range("pool", self.pool_size, max(self.samples), 1000)
-        require(
-            self.choice in ("random", "spread"),
-            "choice",
-            self.choice,
-            "'random' or 'spread'",
-        )
-        require_range("workspace", self.workspace, 0.05, 1.0)
-        require_range("variability", self.variability, 0.0, 10.0)
+@dataclasses.dataclass
+class _Repeat:
+    """What one repeat of the study starts from.
+
+    Attributes:
+        skill: Skill, learned in direct view.
+        prototypes: Prototypes of the reward (N, bands, frames).
+        pool: Demonstrations in the changed view.
+        positions: Test positions (evaluations, 2), m.
+    """
+
+    skill: Any
+    prototypes: np.ndarray
+    pool: list[DemonstrationResult]
+    positions: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class _Test:
+    """One trial of the study.
+
+    Attributes:
+        scheme: Scheme of transfer.
+        samples: Number of samples that it was given.
+        repeat: Number of the repeat.
+        position: Number of the test position.
+    """
+
+    scheme: str
+    samples: int
+    repeat: int
+    position: int
 
 
 def changed_views() -> list[str]:
@@ -122,34 +115,20 @@ def changed_views() -> list[str]:
     return list(CHANGED_VIEWS)
 
 
-@dataclasses.dataclass
-class MirrorOutcome:
-    """What the study found, and what of its first repeat can be shown.
-
-    Attributes:
-        results: for results.json.
-        skill: the source skill of the first repeat.
-        schemes: by name, fitted with the most samples.
-        prototypes: (N, bands, frames).
-        tests: (evaluations, 2) unseen positions, m.
-    """
-
-    results: dict[str, Any]
-    skill: Any
-    schemes: dict[str, Any]
-    prototypes: np.ndarray
-    tests: np.ndarray
-
-
 def choose(
     tau: np.ndarray, count: int, how: str, rng: np.random.Generator
 ) -> np.ndarray:
-    """Which of the samples at tau (N, d) a scheme is given.
+    """Chooses the samples that a scheme is given.
 
     Args:
-        count: how many.
-        how: at "random"; or "spread": each is farthest from those before it,
-            the first being chosen at random.
+        tau: Task parameters of the samples (N, d).
+        count: Number of samples that are chosen.
+        how: "random"; or "spread", where each sample is the one farthest from
+            those before it and the first is random.
+        rng: Source of randomness.
+
+    Returns:
+        Numbers of the chosen samples (count,).
     """
     order = rng.permutation(len(tau))
     if how == "random":
@@ -166,173 +145,179 @@ def run_mirror(executor: TrialExecutor, plan: MirrorPlan) -> MirrorOutcome:
     """Runs the study of one scenario; see the module.
 
     Raises:
-        InputError: if the plan does not fit, or too few demonstrations
+        InputError: If the plan does not fit, or too few demonstrations
             succeed.
     """
     plan.check()
-    direct = load_scenario(plan.direct)
-    target = load_scenario(plan.scenario)
-    # Stages are told apart by their names.
+    # The name distinguishes the phases of several plans in one store.
     among = f", {plan.name}" if plan.name else ""
     title = Path(plan.scenario).stem + among
-    skills: list[Any] = []
-    prototypes: list[np.ndarray] = []
-    # Of the first repeat, with the most samples: what can be shown.
-    shown: dict[str, Any] = {}
-    shown_lessons: list[Result] = []
-    rows: list[dict[str, Any]] = []
-    specs: dict[tuple, Spec] = {}
-    lessons_there: list[list[Result]] = []
-    tests: list[np.ndarray] = []
-    for repeat in range(plan.repeats):
-        of = f"{repeat + 1} of {plan.repeats}"
-        lessons = teach_places(
-            executor,
-            f"Teaching by hand{among}, {of}",
-            plan.direct,
-            plan.demonstrations,
-            (plan.seed, SOURCE, repeat),
-            variability=plan.variability,
-            workspace=plan.workspace,
-        )
-        there = teach_places(
-            executor,
-            f"Teaching, {title}, {of}",
-            plan.scenario,
-            plan.pool_size,
-            (plan.seed, _TARGET, repeat),
-            variability=plan.variability,
-            workspace=plan.workspace,
-        )
-        skills.append(
-            learn_skill(
-                direct.skill, lessons, trial_seed(plan.seed, HIDDEN, repeat)
-            )
-        )
-        prototypes.append(stack_prototypes(lessons))
-        lessons_there.append(there)
-        tests.append(
-            draw_positions(
-                target,
-                plan.evaluations,
-                np.random.default_rng([plan.seed, _TESTS, repeat]),
-                plan.workspace,
-            )
-        )
-    views = executor.run(
+    repeats = [
+        _teach(executor, plan, repeat, among, title)
+        for repeat in range(plan.repeats)
+    ]
+    seen = look_at_positions(
+        executor,
         f"Looking, {title}",
-        {
-            (repeat, place): look(
-                plan.scenario, xy, trial_seed(plan.seed, _LOOKS, repeat, place)
-            )
-            for repeat in range(plan.repeats)
-            for place, xy in enumerate(tests[repeat])
-        },
+        plan.scenario,
+        [each.positions for each in repeats],
+        (plan.seed, _LOOKS),
     )
-    for repeat, there in enumerate(lessons_there):
-        tau = np.array([result["tau"] for result, _ in there])
-        theta = np.array([arrays["theta"] for _, arrays in there])
+    # Each scheme with each number of samples strikes at all test positions.
+    tests: dict[_Test, Spec | None] = {}
+    shown: dict[str, Any] = {}
+    shown_samples: list[DemonstrationResult] = []
+    for number, repeat in enumerate(repeats):
         for count in plan.samples:
             chosen = choose(
-                tau,
+                task_parameters(repeat.pool),
                 count,
                 plan.choice,
-                np.random.default_rng([plan.seed, _CHOICE, repeat, count]),
+                np.random.default_rng([plan.seed, _CHOICE, number, count]),
             )
-            for name in plan.schemes:
-                scheme = fit_scheme(
-                    name,
-                    skills[repeat],
-                    tau[chosen],
-                    theta[chosen],
-                    plan.scenario,
-                )
-                if repeat == 0 and count == max(plan.samples):
-                    shown[name] = scheme
-                    shown_lessons = [there[i] for i in chosen]
-                for place, xy in enumerate(tests[repeat]):
-                    row: dict[str, Any] = {
-                        "scheme": name,
-                        "samples": count,
-                        "repeat": repeat,
-                        "place": place,
-                    }
-                    rows.append(row)
-                    view, _ = views[repeat, place]
-                    if view["found"]:
-                        specs[name, count, repeat, place] = strike(
+            samples = [repeat.pool[i] for i in chosen]
+            schemes = _fit_schemes(plan, repeat.skill, samples)
+            if number == 0 and count == max(plan.samples):
+                shown, shown_samples = schemes, samples
+            for name, scheme in schemes.items():
+                for position, xy in enumerate(repeat.positions):
+                    gaze = seen[number, position]
+                    test = _Test(name, count, number, position)
+                    # A drum that was not found is not struck.
+                    tests[test] = None
+                    if gaze.found:
+                        tests[test] = strike(
                             plan.scenario,
                             xy,
-                            trial_seed(plan.seed, _STRIKES, repeat, place),
-                            scheme.predict([view["tau"]])[0],
-                            prototypes[repeat],
+                            trial_seed(plan.seed, _STRIKES, number, position),
+                            scheme.predict([gaze.tau])[0],
+                            repeat.prototypes,
                         )
-    outcomes = executor.run(f"Drumming, {title}", specs)
-    # A drum that was not found is not struck.
-    missed: Result = ({"reward": 0.0, "success": False}, {})
-    for row in rows:
-        key = (row["scheme"], row["samples"], row["repeat"], row["place"])
-        outcome, _ = outcomes.get(key, missed)
-        row.update(reward=outcome["reward"], success=outcome["success"])
+    strikes = run_trials(
+        executor,
+        f"Drumming, {title}",
+        {test: spec for test, spec in tests.items() if spec is not None},
+    )
+    outcomes = {test: strikes.get(test) for test in tests}
+    first = repeats[0]
     return MirrorOutcome(
-        results=_gather(plan, rows, _map(plan, shown, shown_lessons)),
-        skill=skills[0],
+        results=_make_results(plan, outcomes, _map(plan, shown, shown_samples)),
+        skill=first.skill,
         schemes=shown,
-        prototypes=prototypes[0],
-        tests=tests[0],
+        prototypes=first.prototypes,
+        demonstrations=shown_samples,
+        positions=first.positions,
+        seen=[seen[0, i] for i in range(plan.evaluations)],
     )
 
 
-def _gather(
+def _teach(
+    executor: TrialExecutor,
     plan: MirrorPlan,
-    rows: Sequence[dict[str, Any]],
-    example: dict[str, Any] | None,
+    repeat: int,
+    among: str,
+    title: str,
+) -> _Repeat:
+    """Teaches one repeat: in direct view, then in the changed one."""
+    number = f"{repeat + 1} of {plan.repeats}"
+    more = {"variability": plan.variability, "workspace": plan.workspace}
+    demonstrations = teach_positions(
+        executor,
+        f"Kinesthetic teaching{among}, {number}",
+        plan.direct,
+        plan.demonstrations,
+        (plan.seed, SOURCE, repeat),
+        **more,
+    )
+    pool = teach_positions(
+        executor,
+        f"Kinesthetic teaching, {title}, {number}",
+        plan.scenario,
+        plan.pool_size,
+        (plan.seed, _TARGET, repeat),
+        **more,
+    )
+    return _Repeat(
+        skill=learn_skill(
+            load_scenario(plan.direct).skill,
+            demonstrations,
+            trial_seed(plan.seed, HIDDEN, repeat),
+        ),
+        prototypes=stack_prototypes(demonstrations),
+        pool=pool,
+        positions=draw_positions(
+            load_scenario(plan.scenario),
+            plan.evaluations,
+            np.random.default_rng([plan.seed, _TESTS, repeat]),
+            plan.workspace,
+        ),
+    )
+
+
+def _fit_schemes(
+    plan: MirrorPlan, skill: Any, samples: Sequence[DemonstrationResult]
 ) -> dict[str, Any]:
-    shape = (plan.repeats, plan.evaluations)
-
-    def of(name: str, count: int, field: str) -> np.ndarray:
-        values = [
-            row[field]
-            for row in rows
-            if row["scheme"] == name and row["samples"] == count
-        ]
-        return np.array(values, dtype=float).reshape(shape)
-
-    schemes: dict[str, Any] = {}
-    comparisons = []
-    for count in plan.samples:
-        successes = {name: of(name, count, "success") for name in plan.schemes}
-        for name, table in successes.items():
-            schemes.setdefault(name, {})[str(count)] = {
-                "success_rate": success_rate(table),
-                "per_repeat": table.mean(axis=1).tolist(),
-                "rewards": of(name, count, "reward").ravel().tolist(),
-            }
-        comparisons += compare(successes, count)
+    """All schemes of the plan, fitted to the same samples."""
+    tau = task_parameters(samples)
+    theta = np.array([each.theta for each in samples])
     return {
-        "study": "mirror",
-        "version": __version__,
-        "seed": plan.seed,
-        "scenario": plan.scenario,
-        "samples": list(plan.samples),
-        "repeats": plan.repeats,
-        "evaluations": plan.evaluations,
-        "demonstrations": plan.demonstrations,
-        "choice": plan.choice,
-        "variability": plan.variability,
-        "workspace": plan.workspace,
-        "schemes": schemes,
-        "comparisons": comparisons,
-        "map": example,
+        name: fit_scheme(name, skill, tau, theta, plan.scenario)
+        for name in plan.schemes
     }
+
+
+def _make_results(
+    plan: MirrorPlan,
+    outcomes: Mapping[_Test, StrikeResult | None],
+    example: TransferMap | None,
+) -> MirrorResults:
+    schemes: dict[str, dict[int, SchemeCell]] = {}
+    comparisons: list[SchemeComparisonRow] = []
+    for count in plan.samples:
+        # Tables (repeats, test positions).
+        successes: dict[str, np.ndarray] = {}
+        for name in plan.schemes:
+            strikes = [
+                [
+                    outcomes[_Test(name, count, repeat, position)]
+                    for position in range(plan.evaluations)
+                ]
+                for repeat in range(plan.repeats)
+            ]
+            successes[name] = np.array(
+                [[s.success if s else False for s in row] for row in strikes],
+                dtype=float,
+            )
+            schemes.setdefault(name, {})[count] = SchemeCell(
+                success_rate(successes[name]),
+                successes[name].mean(axis=1).tolist(),
+                [s.reward if s else 0.0 for row in strikes for s in row],
+            )
+        comparisons += compare(successes, count)
+    return MirrorResults(
+        study="mirror",
+        version=__version__,
+        seed=plan.seed,
+        scenario=plan.scenario,
+        samples=list(plan.samples),
+        repeats=plan.repeats,
+        evaluations=plan.evaluations,
+        demonstrations=plan.demonstrations,
+        choice=plan.choice,
+        variability=plan.variability,
+        workspace=plan.workspace,
+        schemes=schemes,
+        comparisons=comparisons,
+        map=example,
+    )
 
 
 def _map(
     plan: MirrorPlan,
-    schemes: dict[str, Any],
-    taught: Sequence[Result],
-) -> dict[str, Any] | None:
-    """The map h of the first repeat on a grid, with what it was taught by."""
+    schemes: Mapping[str, Any],
+    samples: Sequence[DemonstrationResult],
+) -> TransferMap | None:
+    """The map h of the first repeat on a grid, with its samples."""
     if "transfer_default" not in schemes:
         return None
     scheme = schemes["transfer_default"]
@@ -340,18 +325,21 @@ def _map(
     limits = np.array(scenario.skill.input_range)
     axes = [np.linspace(low, high, _GRID) for low, high in limits]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    known = np.array([result["tau"] for result, _ in taught])
-    centre = ["y_img", "q3* [rad]"]
+    known = task_parameters(samples)
+    centered = ["y_img", "q3* [rad]"]
     fixed = ["x_img", "y_img"]
-    mode = scenario.look.mode
-    return {
-        "scheme": "transfer_default",
-        "samples": len(taught),
-        "input_names": fixed if mode == "fixed_yaw" else centre,
-        "output_names": centre,
-        "shape": [_GRID, _GRID],
-        "input": grid.tolist(),
-        "output": scheme.transform(grid).tolist(),
-        "taught_input": known.tolist(),
-        "taught_output": scheme.transform(known).tolist(),
-    }
+    return TransferMap(
+        scheme="transfer_default",
+        samples=len(samples),
+        input_names=fixed if scenario.look.mode == "fixed_yaw" else centered,
+        output_names=centered,
+        shape=[_GRID, _GRID],
+        input=_pairs(grid),
+        output=_pairs(scheme.transform(grid)),
+        taught_input=_pairs(known),
+        taught_output=_pairs(scheme.transform(known)),
+    )
+
+
+def _pairs(points: np.ndarray) -> list[tuple[float, float]]:
+    return [(float(x), float(y)) for x, y in points]

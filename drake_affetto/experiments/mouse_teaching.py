@@ -1,4 +1,4 @@
-"""`affetto teach --by-hand`: a person leads the hand with the mouse."""
+"""`affetto teach --mouse`: a person guides the hand with the mouse."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,15 +7,16 @@ import numpy as np
 from pydrake.geometry import Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform
 
-from drake_affetto.experiments.episode import Lesson, TrialRunner
-from drake_affetto.experiments.teaching import Course, Taught
+from drake_affetto.experiments.episode import GuidedMovement, TrialRunner
+from drake_affetto.experiments.results import DemonstrationResult
+from drake_affetto.experiments.teaching_session import TeachingSession
+from drake_affetto.experiments.trials import demonstrate
 from drake_affetto.station.scenario import Scenario
-from drake_affetto.teaching.demonstrations import Demonstration
 from drake_affetto.teaching.mouse_teacher import require_mouse_spring
 
-# How often is looked whether the hand is held, s.
+# Time between two checks whether the hand is held, s.
 _POLL = 0.02
-# From where the person looks: how far, and from how far above the horizon.
+# Distance and elevation of the camera.
 _DISTANCE = 0.45
 _TILT = np.radians(20.0)
 # A lamp above the drum, outside of what the mouse can take hold of.
@@ -23,8 +24,8 @@ _LAMP = "/lesson/lamp"
 _GREEN, _RED = Rgba(0.1, 0.8, 0.2), Rgba(0.9, 0.1, 0.1)
 
 
-class HandsOnRunner(TrialRunner):
-    """Trials in which a person leads the hand, in real time."""
+class MouseTeachingRunner(TrialRunner):
+    """Trials in which a person guides the hand, in real time."""
 
     def __init__(self, scenario: Scenario, meshcat: Meshcat):
         """Builds a station that is taught by mouse in `meshcat`.
@@ -35,21 +36,21 @@ class HandsOnRunner(TrialRunner):
         super().__init__(scenario, meshcat, by_mouse=True)
         self._browser = meshcat
 
-    def teach_by_mouse(self, xy: np.ndarray) -> Lesson:
-        """Waits until the hand is taken hold of, and records from there.
+    def wait_for_guidance(self, xy: np.ndarray) -> GuidedMovement:
+        """Waits until a person holds the hand, and records from there.
 
         Args:
-            xy: (2,) where the drum stands, m.
+            xy: Position of the drum (2,), m.
         """
         self._soften(xy)
-        self._face_the_stroke()
-        # Whoever still holds the hand has to let go of it first.
+        self._show_stroke()
+        # A person who still holds the hand has to let go of it first.
         self._wait(held=False)
         self._light(_GREEN)
         self._wait(held=True)
         self._light(_RED)
         try:
-            return self._write_lesson(self.context.get_time())
+            return self._record_guidance(self.context.get_time())
         finally:
             self._browser.Delete(_LAMP)
 
@@ -58,35 +59,35 @@ class HandsOnRunner(TrialRunner):
             self._advance(self.context.get_time() + _POLL)
             self._clear_logs()
 
-    def _face_the_stroke(self) -> None:
+    def _show_stroke(self) -> None:
         touching = self.station.touching_position(self._station_context)
         meshcat = self._browser
-        meshcat.SetCameraPose(*viewpoint(self._palm(), touching))
+        meshcat.SetCameraPose(*camera_pose_for_stroke(self._palm(), touching))
 
     def _palm(self) -> np.ndarray:
         plant = self.station.plant
         palm = plant.GetFrameByName("right_palm")
         return palm.CalcPoseInWorld(self._sub(plant)).translation()
 
-    def _light(self, colour: Rgba) -> None:
+    def _light(self, color: Rgba) -> None:
         drum = self.station.head_center_position(self._station_context)
-        self._browser.SetObject(_LAMP, Sphere(0.012), colour)
+        self._browser.SetObject(_LAMP, Sphere(0.012), color)
         self._browser.SetTransform(
             _LAMP, RigidTransform(drum + [0.0, 0.0, 0.25])
         )
 
 
-def viewpoint(
+def camera_pose_for_stroke(
     palm: np.ndarray, touching: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """From where to look so that the stroke lies in the plane of the screen.
+    """A camera pose from which the stroke lies in the plane of the screen.
 
     The mouse moves what it holds in the plane that faces the viewer, so the
     way from palm to drum has to lie in it.
 
     Args:
-        palm: (3,) where the palm is, m.
-        touching: (3,) where it is to come, m.
+        palm: Position of the palm (3,), m.
+        touching: Position where it touches the drum (3,), m.
 
     Returns:
         The camera's position and what it looks at, each (3,) m.
@@ -108,97 +109,77 @@ def viewpoint(
     return middle + _DISTANCE * away, middle
 
 
-def teach_by_hand(
-    course: Course,
+def teach_by_mouse(
+    session: TeachingSession,
     console: Any,
     *,
     ask: Callable[[str], str] = input,
     meshcat: Meshcat | None = None,
-) -> list[Taught]:
-    """Lets a person teach at the places that are still missing.
+) -> list[DemonstrationResult]:
+    """Lets a person teach at the positions that the file does not have.
 
     Args:
-        console: a rich console that tells the person what to do.
-        ask: how the person is asked what to do after a miss.
-        meshcat: where the robot is shown; a new one by default.
+        session: Positions and file.
+        console: A rich console that tells the person what to do.
+        ask: Asks the person what to do after a miss.
+        meshcat: Browser window with the robot; a new one by default.
 
     Returns:
-        What came of each place that was taught at.
+        The demonstration at each position that was reached.
 
     Raises:
-        InputError: if this version of Drake has no mouse spring.
+        InputError: If this version of Drake has no mouse spring.
     """
     require_mouse_spring()
-    course.scenario.simulator_config.target_realtime_rate = 1.0
+    session.scenario.simulator_config.target_realtime_rate = 1.0
     if meshcat is None:
         from pydrake.geometry import StartMeshcat
 
         meshcat = StartMeshcat()
-    trials = HandsOnRunner(course.scenario, meshcat)
+    trials = MouseTeachingRunner(session.scenario, meshcat)
     console.print(
         f"Open {meshcat.web_url()} beside this window.\n"
         "While the lamp over the drum is green, take hold of the robot's right "
         "hand:\nhold Ctrl and drag it with the left mouse button. The lamp "
-        f"turns red: within\n{course.scenario.teaching.duration:g} s lead the "
-        "hand onto the drum, press a little, and lead it back.\n"
+        f"turns red: within\n{session.scenario.teaching.duration:g} s lead "
+        "the hand onto the drum, press a little, and lead it back.\n"
         "Then the robot repeats it, and the drum's sound decides.",
         soft_wrap=True,
     )
-    outcomes: dict[int, Taught] = {}
-    taps = trials.taps()
-    for i in course.missing:
-        xy, seed = course.positions[i], course.seed(i)
-        console.print(
-            f"Position {i + 1} of {len(course.positions)}: the robot looks for "
-            "the drum."
-        )
-        look = trials.look(xy, seed)
-        outcome = Taught(xy, look.found, 0, False, 0.0, 0.0)
-        outcomes[i] = outcome
-        if not look.found:
-            console.print("It does not see it; on to the next.")
-            continue
-        answer = ""
-        while answer == "" and not outcome.success:
+    results: dict[int, DemonstrationResult] = {}
+    answer = ""
+
+    def try_again(attempts: int, reward: float) -> bool:
+        nonlocal answer
+        answer = _ask_after_miss(ask, reward)
+        return answer == ""
+
+    for i in session.missing:
+        xy = session.positions[i]
+
+        def guide(attempt: int, xy: np.ndarray = xy) -> GuidedMovement:
             console.print("Your turn.")
-            lesson = trials.teach_by_mouse(xy)
+            movement = trials.wait_for_guidance(xy)
             console.print("Now the robot repeats it.")
-            recording = trials.play(
-                xy, lesson.theta, seed + 7919 * (outcome.attempts + 1)
-            )
-            reward = trials.reward(recording, taps)
-            outcome.attempts += 1
-            outcome.max_pull = max(outcome.max_pull, lesson.max_pull)
-            outcome.reward = max(outcome.reward, reward)
-            if reward > trials.reward_config.threshold:
-                outcome.success = True
-                course.keep(
-                    i,
-                    Demonstration(
-                        t=lesson.t,
-                        q=lesson.q,
-                        joint_names=tuple(course.scenario.active_joints),
-                        drum_xy=xy,
-                        seed=seed,
-                        attempt=outcome.attempts - 1,
-                        theta=lesson.theta,
-                        task_parameter=look.task_parameter,
-                        reward=reward,
-                        prototype=trials.prototype(recording),
-                        max_pull=outcome.max_pull,
-                        teacher="by mouse",
-                        scenario=course.scenario_name,
-                    ),
-                )
-                console.print(f"The drum sounds (R = {reward:.2f}): kept.")
-            else:
-                answer = _ask_after_miss(ask, reward)
-        if answer == "q":
+            return movement
+
+        console.print(
+            f"Position {i + 1} of {len(session.positions)}: the robot looks "
+            "for the drum."
+        )
+        results[i] = demonstrate(trials, xy, session.seed(i), guide, try_again)
+        if not results[i].found:
+            console.print("It does not see it; on to the next.")
+        elif results[i].success:
+            session.keep(i, results[i], "by mouse")
+            reward = results[i].reward
+            console.print(f"The drum sounds (R = {reward:.2f}): kept.")
+        elif answer == "q":
             break
     return [
-        outcomes[i] if i in outcomes else course.outcome(i)
-        for i in range(len(course.positions))
-        if i in outcomes or i in course.taught
+        results[i] if i in results else session.result(i)
+        for i in range(len(session.positions))
+        if i in results or i in session.taught
     ]
 
 

@@ -1,18 +1,25 @@
 """The skill and the schemes of transfer, as a scenario sets them up."""
 
 from collections.abc import Iterable, Sequence
+import copy
 import functools
 from typing import Any
 
 import numpy as np
 
 from drake_affetto.common.errors import InputError
+from drake_affetto.experiments.results import (
+    DemonstrationResult,
+    GazeResult,
+)
 from drake_affetto.experiments.trials import (
     demonstration,
     draw_positions,
+    look,
+    run_trials,
     trial_seed,
 )
-from drake_affetto.runner.executor import Result, TrialExecutor
+from drake_affetto.runner.executor import TrialExecutor
 from drake_affetto.skill.elm import ElmRegressor
 from drake_affetto.skill.mappings import Mapping
 from drake_affetto.skill.schemes import make_scheme
@@ -33,40 +40,65 @@ def make_skill(config: SkillConfig, seed: int) -> ElmRegressor:
     )
 
 
-def successful(lessons: Iterable[Result]) -> list[Result]:
+def successful(
+    demonstrations: Iterable[DemonstrationResult],
+) -> list[DemonstrationResult]:
     """Those demonstrations whose replay made the drum sound."""
-    return [lesson for lesson in lessons if lesson[0]["success"]]
+    return [each for each in demonstrations if each.success]
 
 
 def learn_skill(
-    config: SkillConfig, lessons: Sequence[Result], seed: int
+    config: SkillConfig,
+    demonstrations: Sequence[DemonstrationResult],
+    seed: int,
 ) -> ElmRegressor:
-    """The skill after the demonstrations, one by one (paper Eqs. 3 and 4).
+    """The skill after all demonstrations (paper Eqs. 3 and 4).
 
     Args:
-        lessons: results of `demonstration` trials, all successful.
-        seed: of the hidden layer.
+        config: Configuration of the skill.
+        demonstrations: Successful demonstrations, learned one by one.
+        seed: Seed of the hidden layer.
 
     Raises:
-        InputError: if there are too few of them.
+        InputError: If there are too few of them.
     """
-    if len(lessons) < _FEWEST:
+    if len(demonstrations) < _FEWEST:
         raise InputError(
-            f"only {len(lessons)} demonstrations made the drum sound; a skill "
-            f"needs {_FEWEST}"
+            f"only {len(demonstrations)} demonstrations made the drum sound; "
+            f"a skill needs {_FEWEST}"
         )
+    return skills_by_count(config, demonstrations, seed)[-1]
+
+
+def skills_by_count(
+    config: SkillConfig,
+    demonstrations: Sequence[DemonstrationResult],
+    seed: int,
+) -> list[ElmRegressor]:
+    """The skill after each of the demonstrations, in order."""
     skill = make_skill(config, seed)
-    for result, arrays in lessons:
-        skill.partial_fit([result["tau"]], [arrays["theta"]])
-    return skill
+    skills = []
+    for each in demonstrations:
+        skill.partial_fit([each.tau], [each.theta])
+        skills.append(copy.deepcopy(skill))
+    return skills
 
 
-def stack_prototypes(lessons: Sequence[Result]) -> np.ndarray:
-    """(N, bands, frames), what the demonstrations' replays sounded like."""
-    return np.stack([arrays["prototype"] for _, arrays in lessons])
+def stack_prototypes(
+    demonstrations: Sequence[DemonstrationResult],
+) -> np.ndarray:
+    """(N, bands, frames), the sounds of the demonstrations' replays."""
+    return np.stack([each.prototype for each in demonstrations])
 
 
-def teach_places(
+def task_parameters(
+    demonstrations: Sequence[DemonstrationResult],
+) -> np.ndarray:
+    """(N, 2), where the drum was seen at the demonstrations."""
+    return np.array([each.tau for each in demonstrations])
+
+
+def teach_positions(
     executor: TrialExecutor,
     label: str,
     scenario: str,
@@ -75,50 +107,84 @@ def teach_places(
     *,
     variability: float = 1.0,
     workspace: float = 1.0,
-) -> list[Result]:
-    """Has `count` places taught, each until the drum sounds.
+) -> list[DemonstrationResult]:
+    """Has demonstrations given at `count` positions of the drum.
 
-    A place where the teacher fails however often is given up for another.
+    Each is repeated until the drum sounds. A position at which the teacher
+    fails every time is replaced by another one.
 
     Args:
-        label: of the stage.
-        scenario: by name or path.
-        seed: of the places and the teacher, numbers.
-        variability: of the teacher, see `demonstration`.
-        workspace: share of the drum's region, see `draw_positions`.
+        executor: Executor of the study.
+        label: Name of this phase of the study.
+        scenario: Scenario, by name or path.
+        count: Number of demonstrations.
+        seed: Seed of the positions and the teacher, as several numbers.
+        variability: Factor of the teacher's variation, see `demonstration`.
+        workspace: Share of the drum's region, see `draw_positions`.
 
     Returns:
-        Results of `demonstration` trials, all successful.
+        The demonstrations, all successful.
 
     Raises:
-        InputError: if two of three places fail.
+        InputError: If two of three positions fail.
     """
     rng = np.random.default_rng([*seed, 0])
     loaded = load_scenario(scenario)
-    places = np.vstack(
+    positions = np.vstack(
         [
             draw_positions(loaded, number, rng, workspace)
             for number in (count, 2 * count)
         ]
     )
-    results: list[Result] = []
+    results: list[DemonstrationResult] = []
     while (missing := count - len(successful(results))) > 0:
-        if len(results) >= len(places):
+        if len(results) >= len(positions):
             raise InputError(
                 f"{label}: only {count - missing} of {len(results)} "
                 "demonstrations made the drum sound"
             )
-        now = range(len(results), min(len(results) + missing, len(places)))
-        results += executor.run(
-            label if not results else f"{label}, further places",
+        now = range(len(results), min(len(results) + missing, len(positions)))
+        results += run_trials(
+            executor,
+            label if not results else f"{label}, further positions",
             {
                 i: demonstration(
-                    scenario, places[i], trial_seed(*seed, 1, i), variability
+                    scenario, positions[i], trial_seed(*seed, 1, i), variability
                 )
                 for i in now
             },
         ).values()
     return successful(results)[:count]
+
+
+def look_at_positions(
+    executor: TrialExecutor,
+    label: str,
+    scenario: str,
+    positions: Sequence[np.ndarray],
+    seed: Sequence[int],
+) -> dict[tuple[int, int], GazeResult]:
+    """Has the gaze search for the drum at the test positions of all repeats.
+
+    Args:
+        executor: Executor of the study.
+        label: Name of this phase of the study.
+        scenario: Scenario, by name or path.
+        positions: Test positions of each repeat, (count, 2) each, m.
+        seed: Seed of the noise, as several numbers.
+
+    Returns:
+        The results by repeat and number of the position.
+    """
+    return run_trials(
+        executor,
+        label,
+        {
+            (repeat, i): look(scenario, xy, trial_seed(*seed, repeat, i))
+            for repeat, each in enumerate(positions)
+            for i, xy in enumerate(each)
+        },
+    )
 
 
 def fit_scheme(

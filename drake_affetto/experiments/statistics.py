@@ -5,21 +5,22 @@ so they are not independent of each other. All here respects that.
 """
 
 from collections.abc import Mapping, Sequence
+import dataclasses
 import itertools
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
 from drake_affetto.common.errors import require
+from drake_affetto.experiments.results import SchemeComparisonRow, SuccessRate
 
 # Up to how many repeats all sign changes are gone through (2^n of them).
 _EXACT = 14
 _RESAMPLES = 20_000
 
 
-def success_rate(successes: ArrayLike, level: float = 0.95) -> dict[str, float]:
+def success_rate(successes: ArrayLike, level: float = 0.95) -> SuccessRate:
     """Mean success and its confidence interval.
 
     Wilson's interval; where repeats differ from each other by more than
@@ -30,7 +31,7 @@ def success_rate(successes: ArrayLike, level: float = 0.95) -> dict[str, float]:
         level: of confidence.
 
     Returns:
-        mean, low and high.
+        The rate and its interval.
 
     Raises:
         InputError: if there is no trial.
@@ -49,11 +50,11 @@ def success_rate(successes: ArrayLike, level: float = 0.95) -> dict[str, float]:
     half = (z / (1.0 + z**2 / n)) * np.sqrt(
         mean * (1.0 - mean) / n + (z / (2.0 * n)) ** 2
     )
-    return {
-        "mean": mean,
-        "low": float(max(0.0, min(mean, middle - half))),
-        "high": float(min(1.0, max(mean, middle + half))),
-    }
+    return SuccessRate(
+        mean,
+        float(max(0.0, min(mean, middle - half))),
+        float(min(1.0, max(mean, middle + half))),
+    )
 
 
 def _design_effect(table: np.ndarray) -> float:
@@ -115,33 +116,29 @@ def cohens_h(first: float, second: float) -> float:
 
 def compare(
     successes: Mapping[str, np.ndarray], samples: int
-) -> list[dict[str, Any]]:
-    """Every pair of schemes, the correction being for all pairs together.
+) -> list[SchemeComparisonRow]:
+    """Compares every pair of schemes, corrected for all pairs together.
 
     Args:
-        successes: by scheme, booleans (repeats, trials); trial j of repeat i
-            is the same place with the same noise for all.
-        samples: how many samples the schemes were given; it is only noted.
-
-    Returns:
-        For each pair a, b, samples, difference (of rates), p, p_corrected and
-        effect_size.
+        successes: By scheme, booleans (repeats, trials); trial j of repeat i
+            has the same position and the same noise for all schemes.
+        samples: Number of samples that the schemes were given, for the record.
     """
-    rows: list[dict[str, Any]] = []
+    rows: list[SchemeComparisonRow] = []
     for a, b in itertools.combinations(successes, 2):
         first, second = (np.asarray(successes[s], float) for s in (a, b))
         rows.append(
-            {
-                "a": a,
-                "b": b,
-                "samples": samples,
-                "difference": float(first.mean() - second.mean()),
-                "p": paired_p(first.sum(axis=1), second.sum(axis=1)),
-                "effect_size": cohens_h(first.mean(), second.mean()),
-            }
+            SchemeComparisonRow(
+                a=a,
+                b=b,
+                samples=samples,
+                difference=float(first.mean() - second.mean()),
+                p=paired_p(first.sum(axis=1), second.sum(axis=1)),
+                effect_size=cohens_h(first.mean(), second.mean()),
+            )
         )
-    corrected = holm([row["p"] for row in rows])
+    corrected = holm([row.p for row in rows if row.p is not None])
     return [
-        {**row, "p_corrected": value}
+        dataclasses.replace(row, p_corrected=value)
         for row, value in zip(rows, corrected, strict=True)
     ]

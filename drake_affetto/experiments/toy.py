@@ -1,4 +1,4 @@
-"""`affetto toy`: transfer on a function of two inputs (paper, Sec. IV).
+"""The toy experiment: transfer on a function of two inputs (paper, Sec. IV).
 
 An ELM learns a function on a square. The square is then turned by half a
 turn, so that the ELM is asked where it has learned nothing; from five points
@@ -18,30 +18,44 @@ Hyper-parameters (the weights of the prior, λ, the noise) were chosen on seeds
 that no report uses.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 import dataclasses
 import math
-from typing import Any
+from typing import Any, TypeVar
 import warnings
 
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from drake_affetto import __version__
+from drake_affetto.common.typing import Array
+from drake_affetto.experiments.plans import ToyPlan
+from drake_affetto.experiments.results import (
+    ToyFigures,
+    ToyMethod,
+    ToyPaper,
+    ToyPaperSource,
+    ToyPaperTransfer,
+    ToyResults,
+    ToySource,
+)
+from drake_affetto.runner.executor import Result, Spec, TrialExecutor
+
+T = TypeVar("T", ToySource, ToyMethod)
 
 # Counted up whenever the same seed gives other numbers than before.
 _REVISION = 2
 
 # As printed in the paper: mean and standard deviation over 100 repeats.
-PAPER: dict[str, Any] = {
-    "source": {"train_mse": 0.00, "test_mse": 0.06, "rotated_mse": 41.71},
-    "transfer": {
-        "train_mse_mean": 0.001,
-        "train_mse_std": 0.001,
-        "other_mse_mean": 0.354,
-        "other_mse_std": 0.661,
-    },
-}
+PAPER = ToyPaper(
+    ToyPaperSource(train_mse=0.00, test_mse=0.06, rotated_mse=41.71),
+    ToyPaperTransfer(
+        train_mse_mean=0.001,
+        train_mse_std=0.001,
+        other_mse_mean=0.354,
+        other_mse_std=0.661,
+    ),
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -97,7 +111,7 @@ BASELINES = {
 FUNCTION = "2 x1^3 + 4 x2 + 2 exp(x1 x2), half a turn (stand-in for Eq. 6)"
 
 
-def toy_function(X: FloatArray) -> FloatArray:
+def toy_function(X: Array) -> Array:
     """f(x) = 2 x₁³ + 4 x₂ + 2 exp(x₁ x₂): X (N, 2) to (N,)."""
     a, b = np.asarray(X, dtype=float).T
     return 2.0 * a**3 + 4.0 * b + 2.0 * np.exp(a * b)
@@ -120,13 +134,13 @@ class ToyProblem:
     """
 
     source: Any
-    X: FloatArray
-    y: FloatArray
-    X_test: FloatArray
-    y_test: FloatArray
-    Z: FloatArray
-    X_target: FloatArray
-    y_target: FloatArray
+    X: Array
+    y: Array
+    X_test: Array
+    y_test: Array
+    Z: Array
+    X_target: Array
+    y_target: Array
 
 
 def make_problem(
@@ -183,9 +197,7 @@ def subset(domain: ToyDomain, seed: int, repeat: int) -> NDArray[np.bool_]:
     return chosen
 
 
-def run_seed(
-    spec: Mapping[str, Any],
-) -> tuple[dict[str, Any], dict[str, FloatArray]]:
+def run_seed(spec: Spec) -> Result:
     """All repeats of one seed: a trial of this study.
 
     Returns:
@@ -232,45 +244,71 @@ def run_seed(
     return result, {name: np.array(rows) for name, rows in errors.items()}
 
 
-def _mse(estimator: Any, X: FloatArray, y: FloatArray) -> float:
+def _mse(estimator: Any, X: Array, y: Array) -> float:
     return float(np.mean((estimator.predict(X) - y) ** 2))
 
 
-def plan(
-    domain: str, seeds: int, seed: int, repeats: int
-) -> list[dict[str, Any]]:
-    """The trials of a domain: a spec for each seed, which determines it."""
-    return [
-        {
+def plan_seeds(domain: str, plan: ToyPlan) -> dict[int, Spec]:
+    """The trials of a domain: by seed, a spec that determines it."""
+    return {
+        seed: {
             "kind": "toy",
             "revision": _REVISION,
             "domain": dataclasses.asdict(DOMAINS[domain]),
-            "seed": seed + k,
-            "repeats": repeats,
+            "seed": seed,
+            "repeats": plan.repeats,
         }
-        for k in range(seeds)
-    ]
-
-
-def gather(
-    trials: list[tuple[dict[str, Any], dict[str, FloatArray]]],
-) -> dict[str, Any]:
-    """The figures of one domain: medians over the seeds, and those seeds'."""
-    return {
-        "source": _medians([result for result, _ in trials]),
-        "transfer": {
-            name: _medians([_summary(rows[name]) for _, rows in trials])
-            for name in TRANSFERS
-        },
-        "baselines": {
-            name: _medians([_summary(rows[name]) for _, rows in trials])
-            for name in BASELINES
-        },
+        for seed in range(plan.seed, plan.seed + plan.seeds)
     }
 
 
-def _summary(errors: FloatArray) -> dict[str, float]:
-    """Of (repeats, 2), the errors on the points given and on the others."""
+def run_toy(executor: TrialExecutor, plan: ToyPlan) -> ToyResults:
+    """Runs the experiment on all domains."""
+    found = {
+        name: gather(
+            executor.run(f"{name} square", plan_seeds(name, plan)).values()
+        )
+        for name in DOMAINS
+    }
+    # The paper's experiment at the top, the harder one beside it.
+    unit = found["unit"]
+    return ToyResults(
+        study="toy",
+        version=__version__,
+        seed=plan.seed,
+        seeds=plan.seeds,
+        repeats=plan.repeats,
+        function=FUNCTION,
+        paper=PAPER,
+        source=unit.source,
+        transfer=unit.transfer,
+        baselines=unit.baselines,
+        wide=found["wide"],
+    )
+
+
+def gather(trials: Iterable[Result]) -> ToyFigures:
+    """The figures of one domain: medians over the seeds, and each seed's."""
+    trials = list(trials)
+    return ToyFigures(
+        source=_medians(ToySource, [result for result, _ in trials]),
+        transfer={
+            name: _medians(
+                ToyMethod, [_summary(rows[name]) for _, rows in trials]
+            )
+            for name in TRANSFERS
+        },
+        baselines={
+            name: _medians(
+                ToyMethod, [_summary(rows[name]) for _, rows in trials]
+            )
+            for name in BASELINES
+        },
+    )
+
+
+def _summary(errors: Array) -> dict[str, float]:
+    """Figures of (repeats, 2), the errors on the points given and others."""
     train, other = errors.T
     return {
         "train_mse_mean": float(train.mean()),
@@ -281,9 +319,9 @@ def _summary(errors: FloatArray) -> dict[str, float]:
     }
 
 
-def _medians(rows: list[dict[str, float]]) -> dict[str, Any]:
+def _medians(kind: type[T], rows: list[dict[str, float]]) -> T:
     per_seed = {key: [row[key] for row in rows] for key in rows[0]}
     medians: dict[str, Any] = {
         key: float(np.median(values)) for key, values in per_seed.items()
     }
-    return {**medians, "per_seed": per_seed}
+    return kind(**medians, per_seed=per_seed)

@@ -1,11 +1,18 @@
 """The kinds of trial that studies plan, and how a worker runs them.
 
 A spec is a plain mapping. `kind` and `scenario` say what to run where; the
-rest determines the trial, including seeds. Results are plain numbers, arrays
-go beside them.
+rest determines the trial, including seeds. The kinds are
+
+    look           the gaze searches for the drum
+    demonstration  the gaze, then a teacher who repeats the movement until the
+                   robot's own replay makes the drum sound
+    strike         a movement with given parameters, without the gaze
+    drumming       the whole chain: gaze, skill, movement, sound
+
+and `drake_affetto.experiments.results` has the result of each.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import dataclasses
 import functools
 import hashlib
@@ -17,13 +24,34 @@ import numpy as np
 from drake_affetto import __version__
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.resources import models_dir, resolve
-from drake_affetto.experiments.episode import Recording, TrialRunner
+from drake_affetto.experiments.episode import (
+    GuidedMovement,
+    Recording,
+    TrialRunner,
+)
+from drake_affetto.experiments.results import (
+    DemonstrationResult,
+    DrummingResult,
+    GazeResult,
+    StrikeResult,
+    TrialResult,
+    pack,
+    unpack,
+)
+from drake_affetto.runner.executor import Key, Result, Spec, TrialExecutor
 from drake_affetto.skill.policy import Regressor
 from drake_affetto.sound.reward import reward_over_time
 from drake_affetto.station.scenario import Scenario, load_scenario
 
 # One runner, so one Diagram, for each scenario and process.
 _RUNNERS: dict[str, TrialRunner] = {}
+
+# What of a scenario says how a skill is learned, which no trial depends on: it
+# is given the outcome.
+_LEARNING = ("skill", "transfer")
+
+# Every replay has noise of its own: its seed is this far from the last one's.
+_REPLAY_SEED_STEP = 7919
 
 
 def runner(scenario: str) -> TrialRunner:
@@ -33,19 +61,9 @@ def runner(scenario: str) -> TrialRunner:
     return _RUNNERS[scenario]
 
 
-def set_runner(scenario: str, trial_runner: TrialRunner) -> None:
-    """Makes tasks in this process use `trial_runner`, e.g. one with Meshcat."""
-    _RUNNERS[scenario] = trial_runner
-
-
-# What of a scenario says how a skill is learned, which no trial depends on: it
-# is given the outcome.
-_LEARNING = ("skill", "transfer")
-
-
 @functools.cache
 def models_digest() -> str:
-    """Tells the bodies and scenes of this installation from any others."""
+    """Distinguishes the models of this installation from any others."""
     root = models_dir()
     # The other YAML files count where a scenario names them.
     suffixes = (".sdf", ".obj", ".xml", ".dmd.yaml")
@@ -101,16 +119,13 @@ def _texts(value: Any) -> Iterator[str]:
 
 
 def _plain(value: Any) -> Any:
-    """The numbers of a config, Drake's own structs included."""
+    """The values of a configuration, Drake's own structs included."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {
-            f.name: _plain(getattr(value, f.name))
-            for f in dataclasses.fields(value)
-        }
-    if hasattr(value, "__fields__"):
-        return {
-            f.name: _plain(getattr(value, f.name)) for f in value.__fields__
-        }
+        fields: Sequence[Any] = dataclasses.fields(value)
+    else:
+        fields = getattr(value, "__fields__", ())
+    if fields:
+        return {f.name: _plain(getattr(value, f.name)) for f in fields}
     if isinstance(value, (list, tuple)):
         return [_plain(v) for v in value]
     if isinstance(value, Mapping):
@@ -118,20 +133,20 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def _spec(kind: str, scenario: str, **rest: Any) -> dict[str, Any]:
+def _spec(kind: str, scenario: str, **rest: Any) -> Spec:
     return {"kind": kind, "scenario": _fingerprint(scenario), **rest}
 
 
 def demonstration(
     scenario: str, xy: Sequence[float], seed: int, variability: float = 1.0
-) -> dict[str, Any]:
-    """Look for the drum at xy, be taught until the replay sounds.
+) -> Spec:
+    """The spec of a demonstration with the drum at xy.
 
-    `variability` scales how much the teacher's strokes differ.
-
-    Result: xy, found, tau (2), attempts, success, reward, max_pull. Arrays:
-    theta (F), q (T, n), prototype (bands, frames); empty where nothing was
-    found.
+    Args:
+        scenario: Scenario, by name or path.
+        xy: Position of the drum (2,), m.
+        seed: Seed of the noise and the teacher.
+        variability: Factor of how much the teacher's strokes differ.
     """
     return _spec(
         "demonstration",
@@ -142,11 +157,8 @@ def demonstration(
     )
 
 
-def look(scenario: str, xy: Sequence[float], seed: int) -> dict[str, Any]:
-    """Look for the drum at xy.
-
-    Result: found, tau (2), duration. Arrays: none.
-    """
+def look(scenario: str, xy: Sequence[float], seed: int) -> Spec:
+    """The spec of a search for the drum at xy with the gaze."""
     return _spec("look", scenario, xy=list(xy), seed=seed)
 
 
@@ -156,13 +168,18 @@ def strike(
     seed: int,
     theta: np.ndarray,
     prototypes: np.ndarray,
-) -> dict[str, Any]:
-    """Play θ (F) with the drum at xy, judged by its sound.
+) -> Spec:
+    """The spec of a movement with the drum at xy, judged by its sound.
 
-    What `drumming` does once the drum has been found; so one look serves all
-    that is tried at one place. `prototypes` are (N, bands, frames).
+    This is what `drumming` does once the drum has been found. So one search
+    serves all movements that are tried at one position.
 
-    Result: reward, success, max_force, impulse. Arrays: reward_over_time.
+    Args:
+        scenario: Scenario, by name or path.
+        xy: Position of the drum (2,), m.
+        seed: Seed of the noise.
+        theta: Parameters of the movement (F,).
+        prototypes: Prototypes of the reward (N, bands, frames).
     """
     return _spec(
         "strike",
@@ -180,10 +197,15 @@ def drumming(
     seed: int,
     regressor: Regressor,
     prototypes: Sequence[np.ndarray],
-) -> dict[str, Any]:
-    """The whole chain with the drum at xy, judged by its sound.
+) -> Spec:
+    """The spec of the whole chain with the drum at xy, judged by its sound.
 
-    Result: found, tau (2), reward, success, max_force, impulse. Arrays: none.
+    Args:
+        scenario: Scenario, by name or path.
+        xy: Position of the drum (2,), m.
+        seed: Seed of the noise.
+        regressor: Skill, from task parameters to parameters of a movement.
+        prototypes: Prototypes of the reward (bands, frames) each.
     """
     return _spec(
         "drumming",
@@ -195,116 +217,185 @@ def drumming(
     )
 
 
-def run_task(spec: Mapping[str, Any]) -> tuple[dict, dict[str, np.ndarray]]:
-    """Runs one spec in this process."""
-    tasks = {
+def run_trial(
+    spec: Spec, runners: Mapping[str, TrialRunner] | None = None
+) -> TrialResult:
+    """Runs one spec in this process.
+
+    Args:
+        spec: What to run.
+        runners: Runners to use instead of this process's own, by scenario,
+            e.g. ones that show the trials in Meshcat.
+
+    Raises:
+        InputError: If there is no such kind of trial.
+    """
+    kinds: dict[str, Callable[[TrialRunner, Spec], TrialResult]] = {
         "demonstration": _run_demonstration,
         "drumming": _run_drumming,
         "look": _run_look,
         "strike": _run_strike,
     }
-    if spec["kind"] not in tasks:
-        raise InputError(f"no kind of trial is called {spec['kind']!r}")
-    return tasks[spec["kind"]](spec)
+    kind = spec["kind"]
+    if kind not in kinds:
+        raise InputError(f"no kind of trial is called {kind!r}")
+    name = spec["scenario"]["name"]
+    return kinds[kind]((runners or {}).get(name) or runner(name), spec)
 
 
-def _run_demonstration(spec: Mapping[str, Any]):
-    trials = runner(spec["scenario"]["name"])
-    threshold = trials.reward_config.threshold
-    xy, seed = np.array(spec["xy"]), spec["seed"]
-    look = trials.look(xy, seed)
-    result: dict[str, Any] = {
-        "xy": spec["xy"],
-        "found": look.found,
-        "tau": look.task_parameter.tolist(),
-        "attempts": 0,
-        "success": False,
-        "reward": 0.0,
-        "max_pull": 0.0,
-    }
+def run_task(
+    spec: Spec, runners: Mapping[str, TrialRunner] | None = None
+) -> Result:
+    """Runs one spec; gives its result as the store keeps it."""
+    return pack(run_trial(spec, runners))
+
+
+def run_trials(
+    executor: TrialExecutor,
+    label: str,
+    specs: Mapping[Key, Spec],
+    on_result: Callable[[Key, Any], None] | None = None,
+) -> dict[Key, Any]:
+    """Runs specs on the executor's workers; gives typed results by key.
+
+    Args:
+        executor: Executor of the study.
+        label: Name of this phase of the study.
+        specs: What to run.
+        on_result: Called with each result as soon as it is there.
+    """
+
+    def typed(key: Key, result: Result) -> Any:
+        return unpack(specs[key]["kind"], *result)
+
+    def report(key: Key, result: Result) -> None:
+        if on_result is not None:
+            on_result(key, typed(key, result))
+
+    found = executor.run(label, specs, report)
+    return {key: typed(key, result) for key, result in found.items()}
+
+
+def demonstrate(
+    trials: TrialRunner,
+    xy: np.ndarray,
+    seed: int,
+    guide: Callable[[int], GuidedMovement],
+    try_again: Callable[[int, float], bool],
+) -> DemonstrationResult:
+    """One demonstration: gaze, then a teacher, until the replay sounds.
+
+    Args:
+        trials: Runner of the scenario.
+        xy: Position of the drum (2,), m.
+        seed: Seed of the noise.
+        guide: The teacher: gives the movement of attempt 0, 1, ...
+        try_again: Whether to repeat the movement after so many attempts, the
+            last with that reward.
+    """
+    gaze = trials.gaze(xy, seed)
     empty = np.zeros((0, 0))
-    arrays = {"theta": np.zeros(0), "q": empty, "prototype": empty}
-    if not look.found:
-        return result, arrays
-    taps = trials.taps()
-    for attempt in range(trials.scenario.teaching.max_attempts):
-        lesson = trials.teach(xy, seed, attempt, spec["variability"])
-        # The robot's own replay decides; each one has its own noise.
-        recording = trials.play(xy, lesson.theta, seed + 7919 * (attempt + 1))
-        value = trials.reward(recording, taps)
-        result["attempts"] = attempt + 1
-        result["max_pull"] = max(result["max_pull"], lesson.max_pull)
-        if value > result["reward"] or attempt == 0:
-            result["reward"] = value
-            arrays = {
-                "theta": lesson.theta,
-                "q": lesson.q,
-                "prototype": trials.prototype(recording),
-            }
-        if value > threshold:
-            result["success"] = True
+    result = DemonstrationResult(
+        xy=np.asarray(xy).tolist(),
+        found=gaze.found,
+        tau=gaze.task_parameter.tolist(),
+        attempts=0,
+        success=False,
+        reward=0.0,
+        max_pull=0.0,
+        theta=np.zeros(0),
+        q=empty,
+        prototype=empty,
+    )
+    if not gaze.found:
+        return result
+    prototypes = trials.tap_prototypes()
+    while not result.success:
+        attempt = result.attempts
+        movement = guide(attempt)
+        # The robot's own replay decides.
+        recording = trials.strike(
+            xy, movement.theta, seed + _REPLAY_SEED_STEP * (attempt + 1)
+        )
+        value = trials.reward(recording, prototypes)
+        result = dataclasses.replace(
+            result,
+            attempts=attempt + 1,
+            success=bool(value > trials.reward_config.threshold),
+            max_pull=max(result.max_pull, movement.max_pull),
+        )
+        if value > result.reward or attempt == 0:
+            result = dataclasses.replace(
+                result,
+                reward=value,
+                theta=movement.theta,
+                q=movement.q,
+                prototype=trials.prototype(recording),
+            )
+        if not result.success and not try_again(attempt + 1, value):
             break
-    return result, arrays
+    return result
 
 
-def _run_drumming(spec: Mapping[str, Any]):
-    trials = runner(spec["scenario"]["name"])
-    look, recording = trials.drum(
+def _run_demonstration(trials: TrialRunner, spec: Spec) -> DemonstrationResult:
+    xy, seed = np.array(spec["xy"]), spec["seed"]
+    limit = trials.scenario.teaching.max_attempts
+    return demonstrate(
+        trials,
+        xy,
+        seed,
+        lambda attempt: trials.teach(xy, seed, attempt, spec["variability"]),
+        lambda attempts, reward: attempts < limit,
+    )
+
+
+def _run_drumming(trials: TrialRunner, spec: Spec) -> DrummingResult:
+    gaze, recording = trials.drum(
         np.array(spec["xy"]), spec["regressor"], spec["seed"]
     )
-    result: dict[str, Any] = {
-        "found": look.found,
-        "tau": look.task_parameter.tolist(),
-        "reward": 0.0,
-        "success": False,
-        "max_force": 0.0,
-        "impulse": 0.0,
-    }
-    if recording is None:
-        return result, {}
-    result.update(_judge(trials, recording, spec["prototypes"]))
-    return result, {}
+    contact = {"max_force": 0.0, "impulse": 0.0}
+    value = 0.0
+    if recording is not None:
+        contact = _contact(recording)
+        value = trials.reward(recording, spec["prototypes"])
+    return DrummingResult(
+        found=gaze.found,
+        tau=gaze.task_parameter.tolist(),
+        reward=value,
+        success=bool(value > trials.reward_config.threshold),
+        **contact,
+    )
 
 
-def _run_look(spec: Mapping[str, Any]):
-    trials = runner(spec["scenario"]["name"])
-    seen = trials.look(np.array(spec["xy"]), spec["seed"])
-    result = {
-        "found": seen.found,
-        "tau": seen.task_parameter.tolist(),
-        "duration": seen.duration,
-    }
-    return result, {}
+def _run_look(trials: TrialRunner, spec: Spec) -> GazeResult:
+    gaze = trials.gaze(np.array(spec["xy"]), spec["seed"])
+    return GazeResult(gaze.found, gaze.task_parameter.tolist(), gaze.duration)
 
 
-def _run_strike(spec: Mapping[str, Any]):
-    trials = runner(spec["scenario"]["name"])
-    recording = trials.play(np.array(spec["xy"]), spec["theta"], spec["seed"])
-    heard = trials.spectrogram(recording)
-    course = reward_over_time(heard, spec["prototypes"])
-    result = _judge(trials, recording, spec["prototypes"])
-    return result, {"reward_over_time": course.astype(np.float32)}
+def _run_strike(trials: TrialRunner, spec: Spec) -> StrikeResult:
+    recording = trials.strike(np.array(spec["xy"]), spec["theta"], spec["seed"])
+    trace = reward_over_time(trials.spectrogram(recording), spec["prototypes"])
+    value = trials.reward(recording, spec["prototypes"])
+    return StrikeResult(
+        reward=value,
+        success=bool(value > trials.reward_config.threshold),
+        **_contact(recording),
+        reward_over_time=trace.astype(np.float32),
+    )
 
 
-def _judge(
-    trials: TrialRunner,
-    recording: Recording,
-    prototypes: Sequence[np.ndarray],
-) -> dict[str, Any]:
-    """The reward, from the sound; and what happened, to hold against it."""
-    value = trials.reward(recording, prototypes)
+def _contact(recording: Recording) -> dict[str, float]:
+    """What happened, to compare the reward with: it does not know of it."""
     force = recording.contact_force[:, 0]
     step = recording.t[1] - recording.t[0]
     return {
-        "reward": value,
-        "success": bool(value > trials.reward_config.threshold),
         "max_force": float(force.max()),
         "impulse": float(force.sum() * step),
     }
 
 
 def trial_seed(*numbers: int) -> int:
-    """A seed of its own for whatever the numbers name.
+    """A seed that belongs to the given numbers alone.
 
     More repeats or positions leave the seeds of the others as they are.
     """
@@ -317,20 +408,23 @@ def draw_positions(
     rng: np.random.Generator,
     workspace: float = 1.0,
 ) -> np.ndarray:
-    """(count, 2) places for the drum, spread over the scenario's region.
+    """Positions of the drum (count, 2), spread over the scenario's region, m.
 
     A scrambled Sobol sequence: random, but without gaps or clusters.
 
     Args:
-        workspace: the share of the region's length and width, about its
-            middle, that is made use of.
+        scenario: Scenario with the region.
+        count: Number of positions.
+        rng: Source of randomness.
+        workspace: Share of the region's length and width, about its center,
+            that is used.
     """
     from scipy.stats import qmc
 
     region = scenario.drum_region
     corners = np.array([region.x, region.y]).T
-    middle = corners.mean(axis=0)
-    low, high = middle + workspace * (corners - middle)
+    center = corners.mean(axis=0)
+    low, high = center + workspace * (corners - center)
     sampler = qmc.Sobol(2, rng=rng)
     bits = max(1, int(np.ceil(np.log2(max(count, 2)))))
     points = sampler.random_base2(bits)[:count]

@@ -86,6 +86,12 @@ class Stage:
     done: int
 
 
+def remove_store(path: Path) -> None:
+    """Deletes a store, with the files that SQLite keeps beside it."""
+    for old in (path, *(Path(f"{path}{s}") for s in ("-wal", "-shm"))):
+        old.unlink(missing_ok=True)
+
+
 class TrialStore:
     """One study's trials; safe against a kill at any moment."""
 
@@ -184,7 +190,7 @@ class TrialStore:
         )
         return [Stage(*row) for row in rows]
 
-    def absorb(self, path: str | Path) -> int:
+    def merge(self, path: str | Path) -> int:
         """Takes over the finished trials of another study's file.
 
         Trials have one key wherever they ran, so the halves of a study that

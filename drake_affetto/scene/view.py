@@ -22,7 +22,7 @@ _DRUM = ("drum x [m]", "drum y [m]")
 _FRAMES = ("eye_camera", "right_palm", "mirror", "head_center")
 
 
-def stand_before(meshcat: Meshcat) -> None:
+def set_default_camera_pose(meshcat: Meshcat) -> None:
     """Puts the browser's camera where robot, drum and mirror are in view."""
     meshcat.SetCameraPose([0.95, -0.75, 0.50], [0.16, 0.02, 0.10])
 
@@ -89,7 +89,7 @@ def view_model(
     for name, a, b, value in zip(_DRUM, low, high, place, strict=True):
         meshcat.AddSlider(name, min=a, max=b, step=0.005, value=value)
     meshcat.AddButton(_STOP, "Escape")
-    stand_before(meshcat)
+    set_default_camera_pose(meshcat)
     positions = sliders.get_output_port()
     end = np.inf if time_limit is None else time.monotonic() + time_limit
     try:

@@ -25,6 +25,7 @@ from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
+from drake_affetto.skill.scheme_names import SCHEMES
 from drake_affetto.skill.transfer import TransferRegressor
 
 
@@ -133,8 +134,6 @@ _MAKERS: dict[str, Callable[..., Any]] = {
     "gaussian_process": _gaussian_process,
     "affine_regression": lambda source: LinearRegression(),
 }
-
-SCHEMES = tuple(_MAKERS)
 
 
 def make_scheme(

@@ -6,10 +6,12 @@ import sys
 
 import pytest
 
-from drake_affetto.cli import study as campaign
 from drake_affetto.common.output import write_json
-from drake_affetto.experiments.drumming import DrumPlan, run_drum
-from drake_affetto.experiments.mirror import MirrorPlan, run_mirror
+from drake_affetto.common.typed_json import to_plain
+from drake_affetto.experiments import trials
+from drake_affetto.experiments.drumming import run_drum
+from drake_affetto.experiments.mirror import run_mirror
+from drake_affetto.experiments.plans import DrumPlan, MirrorPlan
 from drake_affetto.runner.executor import TrialExecutor
 from drake_affetto.runner.store import TrialStore
 from support import fake_world
@@ -24,9 +26,13 @@ def studies(tmp_path_factory):
         TrialStore(root / "t.sqlite") as store,
         TrialExecutor(fake_world.run, store, workers=0, quiet=True) as executor,
     ):
-        drum = run_drum(
-            executor,
-            DrumPlan(demonstrations=5, evaluations=4, repeats=2, active=True),
+        drum = to_plain(
+            run_drum(
+                executor,
+                DrumPlan(
+                    demonstrations=5, evaluations=4, repeats=2, active=True
+                ),
+            )
         )
         plan = MirrorPlan(
             scenario="mirror_and_camera",
@@ -34,7 +40,7 @@ def studies(tmp_path_factory):
             evaluations=3,
             demonstrations=6,
         )
-        mirror = run_mirror(executor, plan).results
+        mirror = to_plain(run_mirror(executor, plan).results)
     every = {
         "study": "scenarios",
         "version": mirror["version"],
@@ -86,7 +92,7 @@ def test_conditions_are_changed_one_at_a_time(tmp_path, monkeypatch):
     )
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
-    monkeypatch.setattr(campaign, "run_task", fake_world.run)
+    monkeypatch.setattr(trials, "run_task", fake_world.run)
     words = "--samples 3 4 --repeats 1 --evaluations 2 --demonstrations 4"
     monkeypatch.setattr(
         sys,

@@ -81,9 +81,9 @@ def test_only_files_of_trials_are_absorbed(tmp_path):
         db.execute("CREATE TABLE letters (a TEXT)")
     with TrialStore(tmp_path / "trials.sqlite") as store:
         with pytest.raises(InputError, match="cannot take trials over"):
-            store.absorb(other)
+            store.merge(other)
         with pytest.raises(InputError, match="no file of trials"):
-            store.absorb(tmp_path / "nowhere.sqlite")
+            store.merge(tmp_path / "nowhere.sqlite")
         # It goes on working.
         store.put(spec(0), {}, {})
         assert len(store) == 1
@@ -93,8 +93,8 @@ INTERRUPTED = r"""
 import os, pathlib, signal, sys, threading, time
 sys.path.insert(0, sys.argv[1])
 from support import fake_world
-from drake_affetto.cli import study as campaign
-campaign.run_task = fake_world.run
+from drake_affetto.experiments import trials
+trials.run_task = fake_world.run
 marks = pathlib.Path(os.environ["FAKE_WORLD_MARKS"])
 
 def ctrl_c():

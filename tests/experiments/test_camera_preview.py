@@ -8,10 +8,10 @@ import pytest
 
 from drake_affetto.cli.main import main
 from drake_affetto.experiments.camera_preview import (
-    LookTrial,
     make_sight,
     region_grid,
 )
+from drake_affetto.experiments.episode import TrialRunner
 from drake_affetto.perception.blob import BlobCalibration
 from drake_affetto.station.scenario import load_scenario, scenario_names
 from drake_affetto.station.station import AffettoStation
@@ -80,16 +80,15 @@ def test_a_drum_that_cannot_be_looked_at_is_refused(capsys, tmp_path):
 @pytest.mark.parametrize("name", ["drumming", "mirror"])
 def test_the_gaze_settles_on_the_true_task_parameter(name):
     scenario = load_scenario(name)
-    trial = LookTrial(scenario)
-    sight = make_sight(trial.station, trial.context)
+    trials = TrialRunner(scenario)
+    sight = make_sight(trials.station, trials.context)
     xy = np.array([scenario.drum_region.x[1], scenario.drum_region.y[1]])
     taus = []
     for seed in (0, 1):
-        trial.begin(xy, seed)
-        settled, tau, elapsed = trial.finish()
-        assert settled
-        assert elapsed < 2.0
-        taus.append(tau)
+        outcome = trials.gaze(xy, seed)
+        assert outcome.found
+        assert outcome.duration < 2.0
+        taus.append(outcome.task_parameter)
     truth = sight.task_parameters(xy, scenario.blob.calibration)[0]
     assert np.all(np.abs(np.array(taus) - truth) < 0.02)
     # The images differ by their noise; the task parameter hardly.
@@ -98,10 +97,9 @@ def test_the_gaze_settles_on_the_true_task_parameter(name):
         assert abs(taus[0][1] - taus[1][1]) < np.deg2rad(0.3)
     # The renderer-free twin gives the same, to a fraction of a pixel.
     scenario.camera.renderer = "analytic"
-    twin = LookTrial(scenario)
-    twin.begin(xy, seed=0)
-    settled, tau, _ = twin.finish()
-    assert settled
+    outcome = TrialRunner(scenario).gaze(xy, seed=0)
+    assert outcome.found
+    tau = outcome.task_parameter
     box = scenario.blob.calibration
     pixel = np.array([box.u_max - box.u_min, box.v_max - box.v_min])
     if name == "drumming":

@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 
 from drake_affetto.cli.main import main
-from drake_affetto.experiments.demo import SCHEMES, DemoSize, run_demo
+from drake_affetto.common.typed_json import to_plain
+from drake_affetto.experiments import demo as demo_module
+from drake_affetto.experiments.demo import run_demo
+from drake_affetto.experiments.plans import DemoPlan
 from drake_affetto.experiments.trials import draw_positions
+from drake_affetto.skill.scheme_names import PAPER_SCHEMES
 from drake_affetto.station.scenario import load_scenario
 
-SMALL = DemoSize(
+SMALL = DemoPlan(
     demonstrations=3, evaluations=1, samples=3, mirror_evaluations=1
 )
 
@@ -18,8 +22,8 @@ SMALL = DemoSize(
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory):
     out = tmp_path_factory.mktemp("demo")
-    results = run_demo(out, seed=0, workers=1, size=SMALL)
-    return out, results
+    results = run_demo(out, SMALL, workers=1)
+    return out, to_plain(results)
 
 
 @pytest.mark.slow
@@ -32,8 +36,10 @@ def test_the_results_have_the_agreed_form(demo):
     assert set(position) == {"xy", "tau", "reward", "success"}
     assert drumming["success_rate"] in (0.0, 1.0)
     assert position["success"] == (position["reward"] > 0.15)
+    (position,) = results["mirror"]["positions"]
+    assert set(position) == {"xy", "tau"}
     schemes = results["mirror"]["schemes"]
-    assert set(schemes) == set(SCHEMES)
+    assert list(schemes) == [*PAPER_SCHEMES, "transfer_default"]
     for scheme in schemes.values():
         assert len(scheme["rewards"]) == 1
     # The teaching worked: the robot's own replay sounded.
@@ -43,10 +49,17 @@ def test_the_results_have_the_agreed_form(demo):
             assert 1 <= taught["attempts"] <= 4
 
 
+def test_both_parts_learn_the_same_skill_from_the_same_demonstrations():
+    plan = DemoPlan(seed=7)
+    assert plan.mirror.demonstrations == plan.drum.demonstrations
+    assert plan.mirror.direct == plan.drum.scenario
+    assert plan.mirror.seed == plan.drum.seed == 7
+
+
 @pytest.mark.slow
 def test_same_seed_same_file_in_whatever_process(demo, tmp_path):
     out, _ = demo
-    run_demo(tmp_path, seed=0, workers=0, size=SMALL, exhibits=False)
+    run_demo(tmp_path, SMALL, workers=0, media=False)
     first = (out / "results.json").read_bytes()
     assert (tmp_path / "results.json").read_bytes() == first
 
@@ -54,14 +67,13 @@ def test_same_seed_same_file_in_whatever_process(demo, tmp_path):
 @pytest.mark.slow
 def test_finished_trials_are_not_run_again(demo, monkeypatch):
     out, results = demo
-    import drake_affetto.experiments.trials as tasks
 
     def refuse(spec):
         raise AssertionError("this trial had been finished")
 
-    monkeypatch.setattr(tasks, "run_task", refuse)
-    again = run_demo(out, seed=0, workers=0, size=SMALL, exhibits=False)
-    assert again == results
+    monkeypatch.setattr(demo_module, "run_task", refuse)
+    again = run_demo(out, SMALL, workers=0, media=False)
+    assert to_plain(again) == results
 
 
 @pytest.mark.slow

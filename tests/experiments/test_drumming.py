@@ -14,12 +14,14 @@ import pytest
 
 from drake_affetto.cli.main import main
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.typed_json import to_plain
 from drake_affetto.experiments.drumming import (
-    DrumPlan,
     active_order,
     demonstrations_needed,
     run_drum,
 )
+from drake_affetto.experiments.plans import DrumPlan
+from drake_affetto.experiments.results import CurvePoint, SuccessRate
 from drake_affetto.experiments.skills import make_skill
 from drake_affetto.experiments.trials import run_task
 from drake_affetto.runner.executor import TrialExecutor
@@ -36,7 +38,8 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 from support import fake_world
 from drake_affetto.common.output import write_json
-from drake_affetto.experiments.drumming import DrumPlan, run_drum
+from drake_affetto.experiments.drumming import run_drum
+from drake_affetto.experiments.plans import DrumPlan
 from drake_affetto.runner.executor import TrialExecutor
 from drake_affetto.runner.store import TrialStore
 
@@ -56,7 +59,7 @@ def in_fake_world(path, plan=PLAN):
         TrialStore(path) as store,
         TrialExecutor(fake_world.run, store, workers=0, quiet=True) as executor,
     ):
-        return run_drum(executor, plan)
+        return to_plain(run_drum(executor, plan))
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +122,7 @@ def test_more_repeats_leave_the_first_as_they_were(tmp_path, results):
         TrialExecutor(fake_world.run, store, workers=0, quiet=True) as executor,
     ):
         finished = len(store)
-        assert run_drum(executor, PLAN) == results
+        assert to_plain(run_drum(executor, PLAN)) == results
         # But for demonstrations that failed, all that there was is used.
         assert executor.reused >= finished - 2
 
@@ -160,7 +163,7 @@ def test_active_order_asks_for_what_leaves_it_most_certain():
 def test_needed_demonstrations_are_those_from_which_it_stays():
     def curve(*means):
         return [
-            {"n": n, "success_rate": {"mean": mean}}
+            CurvePoint(n, SuccessRate(mean, 0.0, 1.0))
             for n, mean in enumerate(means, start=1)
         ]
 
@@ -220,7 +223,7 @@ def test_a_small_study_on_the_robot(tmp_path):
         TrialStore(tmp_path / "trials.sqlite") as store,
         TrialExecutor(run_task, store, workers=2, quiet=True) as executor,
     ):
-        results = run_drum(executor, plan)
+        results = to_plain(run_drum(executor, plan))
     assert all(row["max_pull"] <= 30.0 for row in results["taught"])
     rewards = [row["reward"] for row in results["rewards"]]
     assert len(rewards) == 6

@@ -30,7 +30,7 @@ def lesson(runner):
 
 
 def test_looking_centres_the_marker(runner):
-    look = runner.look(XY, seed=0)
+    look = runner.gaze(XY, seed=0)
     assert look.found
     assert look.duration < 2.5
     x_img, _, found = runner.port("camera.blob")
@@ -44,7 +44,7 @@ def test_looking_centres_the_marker(runner):
 
 
 def test_a_drum_out_of_sight_is_a_failed_trial_not_a_wrong_parameter(runner):
-    look = runner.look(np.array([0.54, 0.34]), seed=0)
+    look = runner.gaze(np.array([0.54, 0.34]), seed=0)
     assert not look.found
     np.testing.assert_array_equal(look.task_parameter, [0.0, 0.0])
 
@@ -65,20 +65,20 @@ def test_a_lesson_is_within_a_persons_strength(runner, lesson):
 
 
 def test_a_replay_sounds_and_its_miss_does_not(runner, lesson):
-    taps = runner.taps()
-    hit = runner.play(XY, lesson.theta, seed=2)
+    taps = runner.tap_prototypes()
+    hit = runner.strike(XY, lesson.theta, seed=2)
     assert hit.contact_force[:, 0].max() > 0.3
     assert runner.reward(hit, taps) > 0.15
-    miss = runner.play(XY + [0.0, 0.25], lesson.theta, seed=2)
+    miss = runner.strike(XY + [0.0, 0.25], lesson.theta, seed=2)
     assert miss.contact_force[:, 0].max() == 0.0
     assert runner.reward(miss, taps) < 0.15
 
 
 def test_a_trial_does_not_depend_on_the_one_before(runner, lesson):
-    first = runner.play(XY, lesson.theta, seed=3)
+    first = runner.strike(XY, lesson.theta, seed=3)
     runner.teach(XY + [0.02, 0.03], seed=5)
-    runner.look(XY - [0.02, 0.03], seed=6)
-    again = runner.play(XY, lesson.theta, seed=3)
+    runner.gaze(XY - [0.02, 0.03], seed=6)
+    again = runner.strike(XY, lesson.theta, seed=3)
     np.testing.assert_array_equal(first.joint_state, again.joint_state)
     np.testing.assert_array_equal(first.contact_force, again.contact_force)
     np.testing.assert_array_equal(first.sound, again.sound)
@@ -89,7 +89,7 @@ def test_the_whole_chain_looks_then_drums(runner, lesson):
     assert look.found
     assert recording is not None
     # The same movement as the replay, but for what the gaze left behind.
-    replay = runner.play(XY, lesson.theta, seed=4)
+    replay = runner.strike(XY, lesson.theta, seed=4)
     n = min(len(recording.joint_t), len(replay.joint_t))
     error = recording.joint_state[:n, :8] - replay.joint_state[:n, :8]
     assert np.degrees(np.abs(error)).max() < 5.0

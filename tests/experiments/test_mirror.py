@@ -9,16 +9,14 @@ import pytest
 
 from drake_affetto.cli.main import main
 from drake_affetto.common.errors import InputError
-from drake_affetto.experiments.mirror import (
-    SCHEMES,
-    MirrorPlan,
-    choose,
-    run_mirror,
-)
+from drake_affetto.common.typed_json import to_plain
+from drake_affetto.experiments.mirror import choose, run_mirror
+from drake_affetto.experiments.plans import MirrorPlan
 from drake_affetto.experiments.skills import fit_scheme, make_skill
 from drake_affetto.experiments.trials import run_task
 from drake_affetto.runner.executor import TrialExecutor
 from drake_affetto.runner.store import TrialStore
+from drake_affetto.skill.scheme_names import STUDY_SCHEMES
 from drake_affetto.station.scenario import load_scenario
 from support import fake_world
 
@@ -43,8 +41,8 @@ def outcome(tmp_path_factory):
 
 
 def test_results_hold_what_is_promised(outcome):
-    results = outcome.results
-    assert list(results["schemes"]) == list(SCHEMES)
+    results = to_plain(outcome.results)
+    assert list(results["schemes"]) == list(STUDY_SCHEMES)
     for scheme in results["schemes"].values():
         assert list(scheme) == ["3", "4", "5"]
         for row in scheme.values():
@@ -63,12 +61,12 @@ def test_results_hold_what_is_promised(outcome):
 def test_transfer_is_good_where_views_differ_by_an_affine_map(outcome):
     rates = {
         name: scheme["5"]["success_rate"]["mean"]
-        for name, scheme in outcome.results["schemes"].items()
+        for name, scheme in to_plain(outcome.results)["schemes"].items()
     }
     assert rates["transfer_default"] >= 0.9
     assert rates["unchanged"] < 0.5
     # The map that was learned is the one between the two views.
-    example = outcome.results["map"]
+    example = to_plain(outcome.results)["map"]
     assert np.shape(example["input"]) == np.shape(example["output"])
     A, b = fake_world.VIEWS["mirror"]
     B, c = fake_world.VIEWS["drumming"]
@@ -108,9 +106,9 @@ def test_halves_of_a_study_make_the_whole(tmp_path):
             # Specs in an order of its own, until it has all of its half.
             Greedy(half, store).study()
     with TrialStore(tmp_path / "union.sqlite") as store:
-        sizes = [store.absorb(tmp_path / f"{p}.sqlite") for p in (0, 1)]
+        sizes = [store.merge(tmp_path / f"{p}.sqlite") for p in (0, 1)]
         assert all(sizes)
-        assert store.absorb(tmp_path / "1.sqlite") == 0
+        assert store.merge(tmp_path / "1.sqlite") == 0
         with TrialExecutor(never, store, workers=0, quiet=True) as executor:
             again = run_mirror(executor, SMALL)
     whole = in_fake_world(tmp_path / "whole.sqlite", SMALL)
@@ -191,7 +189,8 @@ def test_a_small_study_on_the_robot(tmp_path):
         pool=2,
         schemes=("unchanged", "transfer_default"),
     )
-    results = in_fake_world(tmp_path / "t.sqlite", plan, run_task).results
+    outcome = in_fake_world(tmp_path / "t.sqlite", plan, run_task)
+    results = to_plain(outcome.results)
     for scheme in results["schemes"].values():
         assert len(scheme["2"]["rewards"]) == 1
     assert results["map"]["input_names"] == ["x_img", "y_img"]

@@ -10,10 +10,14 @@ import pytest
 from rich.console import Console
 
 from drake_affetto.cli import main as cli
-from drake_affetto.experiments import mouse_teaching as by_hand
-from drake_affetto.experiments.episode import Lesson, Look
-from drake_affetto.experiments.mouse_teaching import teach_by_hand, viewpoint
-from drake_affetto.experiments.teaching import Course
+from drake_affetto.experiments import mouse_teaching
+from drake_affetto.experiments.episode import GazeOutcome, GuidedMovement
+from drake_affetto.experiments.mouse_teaching import (
+    camera_pose_for_stroke,
+    teach_by_mouse,
+)
+from drake_affetto.experiments.plans import TeachPlan
+from drake_affetto.experiments.teaching_session import TeachingSession
 from drake_affetto.motion.dmp import Dmp, DmpConfig
 from drake_affetto.sound.reward import RewardConfig
 from drake_affetto.teaching import mouse_teacher
@@ -83,7 +87,7 @@ class Person:
 def test_a_person_teaches(tmp_path, monkeypatch):
     meshcat = Meshcat()
 
-    class Hurried(by_hand.HandsOnRunner):
+    class Hurried(mouse_teaching.MouseTeachingRunner):
         """Not in real time, and with somebody at the mouse."""
 
         def __init__(self, *args):
@@ -92,13 +96,13 @@ def test_a_person_teaches(tmp_path, monkeypatch):
             self.simulator.set_target_realtime_rate(0.0)
             self.simulator.set_monitor(Person(self, meshcat))
 
-    monkeypatch.setattr(by_hand, "HandsOnRunner", Hurried)
+    monkeypatch.setattr(mouse_teaching, "MouseTeachingRunner", Hurried)
     mine = tmp_path / "mine.yaml"
     mine.write_text("extends: drumming\ncamera: {renderer: analytic}\n")
     path = tmp_path / "taught.h5"
-    course = Course(str(mine), 1, 0, path)
+    course = TeachingSession(TeachPlan(1, str(mine)), path)
     console = Console(file=io.StringIO(), width=100)
-    (taught,) = teach_by_hand(course, console, meshcat=meshcat)
+    (taught,) = teach_by_mouse(course, console, meshcat=meshcat)
     assert (taught.attempts, taught.success) == (1, True)
     (found,) = read_demonstrations(path)
     strength = course.scenario.teaching.max_force
@@ -119,15 +123,15 @@ class Rewards:
         self.rewards, self.unseen = iter(rewards), iter(unseen)
         self.dmp = Dmp(DmpConfig())
 
-    def look(self, xy, seed):
+    def gaze(self, xy, seed):
         seen = not next(self.unseen, False)
-        return Look(seen, np.array([0.4, 0.1]), 1.0)
+        return GazeOutcome(seen, np.array([0.4, 0.1]), 1.0)
 
-    def teach_by_mouse(self, xy):
+    def wait_for_guidance(self, xy):
         t = np.arange(1, 301) / 100.0
-        return Lesson(t, np.zeros((300, 8)), np.zeros(120), 12.0)
+        return GuidedMovement(t, np.zeros((300, 8)), np.zeros(120), 12.0)
 
-    def play(self, xy, theta, seed):
+    def strike(self, xy, theta, seed):
         return next(self.rewards)
 
     def reward(self, recording, taps):
@@ -136,20 +140,22 @@ class Rewards:
     def prototype(self, recording):
         return np.ones((3, 4))
 
-    def taps(self):
+    def tap_prototypes(self):
         return []
 
 
 @pytest.fixture
 def session(tmp_path, monkeypatch):
     """Teaches with given rewards and answers: (taught, course, told)."""
-    monkeypatch.setattr(by_hand, "require_mouse_spring", lambda: None)
+    monkeypatch.setattr(mouse_teaching, "require_mouse_spring", lambda: None)
 
     def run(count, rewards, answers, unseen=()):
         monkeypatch.setattr(
-            by_hand, "HandsOnRunner", lambda *_: Rewards(rewards, unseen)
+            mouse_teaching,
+            "MouseTeachingRunner",
+            lambda *_: Rewards(rewards, unseen),
         )
-        course = Course("drumming", count, 0, tmp_path / "taught.h5")
+        course = TeachingSession(TeachPlan(count), tmp_path / "taught.h5")
         buffer = io.StringIO()
         told = []
 
@@ -157,7 +163,7 @@ def session(tmp_path, monkeypatch):
             told.append(question)
             return answers.pop(0)
 
-        taught = teach_by_hand(
+        taught = teach_by_mouse(
             course,
             Console(file=buffer, width=100),
             ask=ask,
@@ -198,7 +204,7 @@ def test_nobody_to_answer_stops():
     def closed(_):
         raise EOFError
 
-    assert by_hand._ask_after_miss(closed, 0.0) == "q"
+    assert mouse_teaching._ask_after_miss(closed, 0.0) == "q"
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -208,7 +214,7 @@ def test_the_stroke_lies_in_the_plane_of_the_screen(seed):
     touching = rng.uniform([0.17, -0.22, 0.05], [0.32, 0.03, 0.08])
     if seed == 0:
         touching[:2] = palm[:2]
-    eye, middle = viewpoint(palm, touching)
+    eye, middle = camera_pose_for_stroke(palm, touching)
     view = middle - eye
     assert view @ (touching - palm) == pytest.approx(0.0, abs=1e-12)
     # From the robot's right or front, not through it or the mirror on its

@@ -21,9 +21,9 @@ def test_one_repeat_is_wilsons_interval(hits):
     row = np.arange(10) < hits
     found = success_rate([row])
     wilson = stats.binomtest(hits, 10).proportion_ci(method="wilson")
-    assert found["mean"] == hits / 10
-    assert found["low"] == pytest.approx(wilson.low, abs=1e-12)
-    assert found["high"] == pytest.approx(wilson.high, abs=1e-12)
+    assert found.mean == hits / 10
+    assert found.low == pytest.approx(wilson.low, abs=1e-12)
+    assert found.high == pytest.approx(wilson.high, abs=1e-12)
 
 
 def test_repeats_that_differ_count_for_less():
@@ -32,16 +32,16 @@ def test_repeats_that_differ_count_for_less():
     uneven = np.array([[i % 2] * 6 for i in range(10)])
     assert even.mean() == uneven.mean()
     narrow, wide = success_rate(even), success_rate(uneven)
-    assert wide["high"] - wide["low"] > 1.8 * (narrow["high"] - narrow["low"])
+    assert wide.high - wide.low > 1.8 * (narrow.high - narrow.low)
     # All trials of a repeat alike: as many as there are repeats, in the main.
     ten = success_rate(uneven[:, :1])
-    assert wide["low"] == pytest.approx(ten["low"], abs=0.02)
+    assert wide.low == pytest.approx(ten.low, abs=0.02)
     # It covers what it should, also where repeats differ.
     covered = 0
     for _ in range(400):
         rates = rng.beta(3, 1.5, size=(10, 1))
         found = success_rate(rng.random((10, 6)) < rates)
-        covered += found["low"] <= 2 / 3 <= found["high"]
+        covered += found.low <= 2 / 3 <= found.high
     assert covered / 400 > 0.9
 
 
@@ -88,20 +88,20 @@ def test_effect_size_has_a_sign_and_limits():
     assert cohens_h(0.2, 0.5) == -cohens_h(0.5, 0.2)
 
 
-def test_compare_tells_every_pair_once():
+def test_compare_has_every_pair_once():
     rng = np.random.default_rng(2)
     better = rng.random((10, 6)) < 0.97
     worse = rng.random((10, 6)) < 0.2
     rows = compare({"x": better, "y": worse, "z": worse}, 3)
-    assert [(r["a"], r["b"]) for r in rows] == [
+    assert [(r.a, r.b) for r in rows] == [
         ("x", "y"),
         ("x", "z"),
         ("y", "z"),
     ]
     for row in rows[:2]:
-        assert row["difference"] > 0.5
-        assert row["effect_size"] > 0.8
-        assert row["p"] <= row["p_corrected"] < 0.05
-    assert rows[2]["difference"] == 0.0
-    assert rows[2]["p_corrected"] == 1.0
-    assert {r["samples"] for r in rows} == {3}
+        assert row.difference > 0.5
+        assert row.effect_size > 0.8
+        assert row.p <= row.p_corrected < 0.05
+    assert rows[2].difference == 0.0
+    assert rows[2].p_corrected == 1.0
+    assert {r.samples for r in rows} == {3}

@@ -1,5 +1,6 @@
 """Teaching many places into a file: order, resuming, refusals."""
 
+import contextlib
 import io
 import os
 from pathlib import Path
@@ -14,10 +15,14 @@ import pytest
 from rich.console import Console
 
 from drake_affetto.cli import main as cli
-from drake_affetto.cli.teach import print_taught
+from drake_affetto.cli.teach import print_outcomes
 from drake_affetto.common.errors import InputError
 from drake_affetto.experiments import trials as tasks
-from drake_affetto.experiments.teaching import Course, Taught, teach
+from drake_affetto.experiments.plans import TeachPlan
+from drake_affetto.experiments.results import DemonstrationResult
+from drake_affetto.experiments.teaching import teach
+from drake_affetto.experiments.teaching_session import TeachingSession
+from drake_affetto.runner.executor import TrialExecutor
 from drake_affetto.runner.store import TrialStore
 from drake_affetto.teaching.demonstrations import (
     Demonstration,
@@ -31,6 +36,7 @@ def fake_trial(spec):
     rng = np.random.default_rng(spec["seed"])
     success = spec["seed"] % 4 != 3
     result = {
+        "xy": spec["xy"],
         "found": True,
         "tau": rng.normal(size=2).tolist(),
         "attempts": 1 + spec["seed"] % 2 if success else 4,
@@ -59,20 +65,34 @@ def trials(monkeypatch):
     return ran
 
 
-def course(path, count=6, *, scenario="drumming", seed=0):
-    return Course(scenario, count, seed, path)
+def session(path, count=6, *, scenario="drumming", seed=0):
+    return TeachingSession(TeachPlan(count, scenario, seed), path)
+
+
+def taught_here(session):
+    """Teaches in this process, with what stands for the robot."""
+
+    @contextlib.contextmanager
+    def executor(path):
+        with (
+            TrialStore(path) as store,
+            TrialExecutor(tasks.run_task, store, workers=0, quiet=True) as made,
+        ):
+            yield made
+
+    return teach(session, executor)
 
 
 def test_what_sounded_is_in_the_file_and_the_rest_is_told(tmp_path, trials):
     path = tmp_path / "deep" / "taught.h5"
-    taught = teach(course(path), workers=0)
+    taught = taught_here(session(path))
     assert [each.success for each in taught] == [True] * 3 + [False] + [
         True
     ] * 2
     assert [each.attempts for each in taught] == [1, 2, 1, 4, 1, 2]
     found = read_demonstrations(path)
     assert [each.seed for each in found] == [0, 1, 2, 4, 5]
-    positions = course(path).positions
+    positions = session(path).positions
     for each in found:
         np.testing.assert_array_equal(each.drum_xy, positions[each.seed])
         assert each.attempt == each.seed % 2
@@ -82,7 +102,7 @@ def test_what_sounded_is_in_the_file_and_the_rest_is_told(tmp_path, trials):
         assert each.theta.shape == (120,)
         assert each.task_parameter.shape == (2,)
     buffer = io.StringIO()
-    print_taught(taught, Console(file=buffer, width=100))
+    print_outcomes(taught, Console(file=buffer, width=100))
     told = buffer.getvalue()
     assert "5 of 6 positions taught, 3 (50%) at first try" in told
     assert told.count("no sound") == 1
@@ -90,17 +110,17 @@ def test_what_sounded_is_in_the_file_and_the_rest_is_told(tmp_path, trials):
 
 def test_going_on_repeats_nothing_and_ends_in_the_same_file(tmp_path, trials):
     whole, parts = tmp_path / "whole.h5", tmp_path / "parts.h5"
-    expected = teach(course(whole, 10), workers=0)
+    expected = taught_here(session(whole, 10))
     trials.clear()
-    teach(course(parts, 3), workers=0)
+    taught_here(session(parts, 3))
     # All of it is in the file: nothing else is left.
     assert set(os.listdir(tmp_path)) == {
         "whole.h5",
         "whole.h5.trials.sqlite",
         "parts.h5",
     }
-    teach(course(parts, 7), workers=0)
-    taught = teach(course(parts, 10), workers=0)
+    taught_here(session(parts, 7))
+    taught = taught_here(session(parts, 10))
     assert trials == list(range(10))
     assert parts.read_bytes() == whole.read_bytes()
     for a, b in zip(taught, expected, strict=True):
@@ -112,19 +132,19 @@ def test_going_on_repeats_nothing_and_ends_in_the_same_file(tmp_path, trials):
             b.max_pull,
         )
     # Fewer than there are: the file stays as it is.
-    assert len(teach(course(parts, 2), workers=0)) == 2
+    assert len(taught_here(session(parts, 2))) == 2
     assert parts.read_bytes() == whole.read_bytes()
 
 
 def test_order_is_the_plans_whoever_finishes_first(tmp_path, trials):
     path = tmp_path / "taught.h5"
     # A run that was killed while the first position took long.
-    positions = course(path).positions
+    positions = session(path).positions
     with TrialStore(f"{path}.trials.sqlite") as store:
         for i in (2, 1, 3):
             spec = tasks.demonstration("drumming", positions[i].tolist(), i)
             store.put(spec, *fake_trial(spec))
-    teach(course(path), workers=0)
+    taught_here(session(path))
     assert trials == [0, 4, 5]
     assert [d.seed for d in read_demonstrations(path)] == [0, 1, 2, 4, 5]
 
@@ -137,7 +157,7 @@ def test_ctrl_c_says_how_to_go_on(tmp_path, monkeypatch, capsys):
 
     monkeypatch.setattr(tasks, "run_task", run)
     path = tmp_path / "t.h5"
-    words = ["teach", "--out", str(path), "--positions", "5"]
+    words = ["teach", "--out", str(path), "--demonstrations", "5"]
     assert cli.main([*words, "--workers", "0"]) == 130
     told = " ".join(capsys.readouterr().out.split())
     assert "2 of 5 positions are in" in told
@@ -186,14 +206,14 @@ def test_a_kill_loses_at_most_the_one_in_progress(tmp_path, trials):
         process.wait()
     there = len(read_demonstrations(path))
     assert 3 <= there < 30
-    taught = teach(course(path, 40), workers=0)
+    taught = taught_here(session(path, 40))
     # The killed run may have finished one that had not come into the file;
     # the fourth one never sounds and is in the store.
     assert 40 - len(trials) - there in (0, 1, 2)
     assert len(trials) == len(set(trials))
     assert [each.success for each in taught] == [i % 4 != 3 for i in range(40)]
     undisturbed = tmp_path / "undisturbed.h5"
-    teach(course(undisturbed, 40), workers=0)
+    taught_here(session(undisturbed, 40))
     assert path.read_bytes() == undisturbed.read_bytes()
 
 
@@ -204,14 +224,14 @@ def test_a_kill_loses_at_most_the_one_in_progress(tmp_path, trials):
         ({"seed": 1}, "seed 0, not 1"),
     ],
 )
-def test_a_file_of_another_course_is_refused(
+def test_a_file_of_another_session_is_refused(
     tmp_path, trials, changes, message
 ):
     path = tmp_path / "taught.h5"
-    teach(course(path, 2), workers=0)
+    taught_here(session(path, 2))
     before = path.read_bytes()
     with pytest.raises(InputError, match=message):
-        course(path, 2, **changes)
+        session(path, 2, **changes)
     assert path.read_bytes() == before
 
 
@@ -232,41 +252,45 @@ def test_files_of_others_are_refused(tmp_path, monkeypatch):
 
     holds(version="0.0.0")
     with pytest.raises(InputError, match=r"version 0\.0\.0, not"):
-        course(path)
+        session(path)
     holds(seed=None)
     with pytest.raises(InputError, match="seed None, not 0"):
-        course(path)
+        session(path)
     holds()
-    with pytest.raises(InputError, match="other places"):
-        course(path)
+    with pytest.raises(InputError, match="other positions"):
+        session(path)
     path.write_text("t, q0\n")
     with pytest.raises(InputError, match="no HDF5 file"):
-        course(path)
+        session(path)
     with pytest.raises(InputError, match="not a folder"):
-        course(tmp_path)
+        session(tmp_path)
 
 
 def test_a_robot_that_does_not_move_by_itself_cannot_be_taught(tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text("extends: drumming\nmotion_source: external\n")
     with pytest.raises(InputError, match="motion_source"):
-        course(tmp_path / "t.h5", scenario=str(path))
+        session(tmp_path / "t.h5", scenario=str(path))
 
 
 def test_two_at_one_file_are_noticed(tmp_path, trials):
     path = tmp_path / "taught.h5"
-    one, other = course(path, 2), course(path, 2)
-    teach(one, workers=0)
-    with pytest.raises(InputError, match="somebody else"):
-        teach(other, workers=0)
+    one, other = session(path, 2), session(path, 2)
+    taught_here(one)
+    with pytest.raises(InputError, match="another process"):
+        taught_here(other)
 
 
-def test_a_drum_that_is_not_seen_is_told_of():
+def test_a_drum_that_is_not_seen_is_reported():
     buffer = io.StringIO()
-    unseen = Taught(np.zeros(2), False, 0, False, 0.0, 0.0)
-    print_taught([unseen], Console(file=buffer, width=100))
+    nothing = np.zeros(0)
+    unseen = DemonstrationResult(
+        *([0.2, 0.0], False, [0.0, 0.0], 0, False, 0.0, 0.0),
+        *(nothing, nothing, nothing),
+    )
+    print_outcomes([unseen], Console(file=buffer, width=100))
     assert "drum not seen" in buffer.getvalue()
-    print_taught([], Console(file=buffer, width=100))
+    print_outcomes([], Console(file=buffer, width=100))
 
 
 @pytest.mark.slow
@@ -292,5 +316,5 @@ def test_the_robot_is_taught(tmp_path):
             trials.dmp.encode(each.t, each.q), each.theta, atol=1e-8
         )
         # And the movement strikes the drum where it stood.
-        recording = trials.play(each.drum_xy, each.theta, 0)
-        assert trials.reward(recording, trials.taps()) > threshold
+        recording = trials.strike(each.drum_xy, each.theta, 0)
+        assert trials.reward(recording, trials.tap_prototypes()) > threshold

@@ -10,7 +10,9 @@ import pytest
 
 from drake_affetto.cli import toy as command
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.typed_json import to_plain
 from drake_affetto.experiments import toy
+from drake_affetto.experiments.plans import ToyPlan
 
 
 def arguments(*words):
@@ -52,8 +54,11 @@ def test_subsets():
 
 def test_transfers_beat_what_they_should():
     """In small: the order of the methods, not the figures."""
-    trials = [toy.run_seed(spec) for spec in toy.plan("unit", 3, 50, 6)]
-    figures = toy.gather(trials)
+    plan = ToyPlan(repeats=6, seeds=3, seed=50)
+    specs = toy.plan_seeds("unit", plan)
+    figures = to_plain(
+        toy.gather([toy.run_seed(spec) for spec in specs.values()])
+    )
     assert figures["source"]["train_mse"] < 0.01
     assert figures["source"]["test_mse"] < 0.2
     assert 10.0 < figures["source"]["rotated_mse"] < 200.0

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from drake_affetto.common.errors import InputError
-from drake_affetto.experiments import trials as tasks
-from drake_affetto.experiments.episode import TrialRunner
+from drake_affetto.experiments import results, trials
+from drake_affetto.experiments.episode import GazeOutcome
 from drake_affetto.runner.store import trial_key
 from drake_affetto.station.scenario import load_scenario
 from support import fake_world
@@ -25,43 +25,43 @@ class Constant:
 
 @pytest.fixture(scope="module", autouse=True)
 def runner():
-    made = TrialRunner(load_scenario("drumming"))
-    tasks.set_runner("drumming", made)
-    yield made
-    tasks._RUNNERS.clear()
+    yield trials.runner("drumming")
+    trials._RUNNERS.clear()
 
 
 @pytest.fixture(scope="module")
-def lesson():
-    return tasks.run_task(tasks.demonstration("drumming", XY, 1))
+def demonstration():
+    return trials.run_task(trials.demonstration("drumming", XY, 1))
 
 
-def test_a_look_and_a_strike_are_what_the_whole_chain_is(runner, lesson):
-    result, arrays = lesson
+def test_a_look_and_a_strike_are_what_the_whole_chain_is(runner, demonstration):
+    result, arrays = demonstration
     assert result["success"]
-    # Not the lesson's own: a strike repeats just what that sounded like.
-    prototypes = runner.taps()
-    whole, _ = tasks.run_task(
-        tasks.drumming("drumming", XY, 4, Constant(arrays["theta"]), prototypes)
+    # Not the demonstration's own: a strike repeats just what that sounded like.
+    prototypes = runner.tap_prototypes()
+    whole, _ = trials.run_task(
+        trials.drumming(
+            "drumming", XY, 4, Constant(arrays["theta"]), prototypes
+        )
     )
-    seen, _ = tasks.run_task(tasks.look("drumming", XY, 4))
+    seen, _ = trials.run_task(trials.look("drumming", XY, 4))
     assert seen["found"]
     assert seen["tau"] == whole["tau"]
-    struck, more = tasks.run_task(
-        tasks.strike("drumming", XY, 4, arrays["theta"], prototypes)
+    struck, more = trials.run_task(
+        trials.strike("drumming", XY, 4, arrays["theta"], prototypes)
     )
     # But for what the turn of the gaze has left behind in the body.
     assert struck["success"] == whole["success"]
     assert struck["reward"] == pytest.approx(whole["reward"], abs=0.1)
     assert struck["impulse"] == pytest.approx(whole["impulse"], rel=0.15)
-    course = more["reward_over_time"]
-    assert course.max() == pytest.approx(struck["reward"], abs=1e-4)
+    trace = more["reward_over_time"]
+    assert trace.max() == pytest.approx(struck["reward"], abs=1e-4)
 
 
-def test_variability_reaches_the_teacher(lesson):
-    _, arrays = lesson
+def test_variability_reaches_the_teacher(demonstration):
+    _, arrays = demonstration
     same, other = (
-        tasks.run_task(tasks.demonstration("drumming", XY, 1, factor))[1]
+        trials.run_task(trials.demonstration("drumming", XY, 1, factor))[1]
         for factor in (1.0, 0.0)
     )
     np.testing.assert_array_equal(same["theta"], arrays["theta"])
@@ -70,44 +70,44 @@ def test_variability_reaches_the_teacher(lesson):
 
 def test_what_is_no_trial_is_an_error():
     with pytest.raises(InputError, match="'dance'"):
-        tasks.run_task({"kind": "dance"})
+        trials.run_task({"kind": "dance"})
 
 
 def test_seeds_differ_and_stay():
     seeds = {
-        tasks.trial_seed(a, b, c)
+        trials.trial_seed(a, b, c)
         for a in range(6)
         for b in range(6)
         for c in range(6)
     }
     assert len(seeds) == 216
     assert all(0 <= seed < 2**31 for seed in seeds)
-    assert tasks.trial_seed(3, 1, 4) == tasks.trial_seed(3, 1, 4)
+    assert trials.trial_seed(3, 1, 4) == trials.trial_seed(3, 1, 4)
 
 
 def test_a_smaller_workspace_lies_in_the_middle():
     scenario = load_scenario("drumming")
     whole, half = (
-        tasks.draw_positions(scenario, 64, np.random.default_rng(0), share)
+        trials.draw_positions(scenario, 64, np.random.default_rng(0), share)
         for share in (1.0, 0.5)
     )
     middle = np.array([scenario.drum_region.x, scenario.drum_region.y]).mean(1)
     np.testing.assert_allclose(half - middle, 0.5 * (whole - middle))
 
 
-def test_the_fake_world_offers_what_the_real_one_does(lesson):
+def test_the_fake_world_offers_what_the_real_one_does(demonstration):
     """What studies are planned with in tests has the true results' fields."""
-    real, arrays = lesson
-    fake, fakes = fake_world.run(tasks.demonstration("drumming", XY, 1))
+    real, arrays = demonstration
+    fake, fakes = fake_world.run(trials.demonstration("drumming", XY, 1))
     assert set(fake) == set(real)
     assert set(fakes) == set(arrays)
-    spec = tasks.look("drumming", XY, 2)
-    assert set(fake_world.run(spec)[0]) == set(tasks.run_task(spec)[0])
-    spec = tasks.strike(
+    spec = trials.look("drumming", XY, 2)
+    assert set(fake_world.run(spec)[0]) == set(trials.run_task(spec)[0])
+    spec = trials.strike(
         "drumming", XY, 2, arrays["theta"], arrays["prototype"][None]
     )
     for ours, theirs in zip(
-        fake_world.run(spec), tasks.run_task(spec), strict=True
+        fake_world.run(spec), trials.run_task(spec), strict=True
     ):
         assert set(ours) == set(theirs)
 
@@ -118,10 +118,10 @@ def test_a_trial_is_known_by_all_that_determines_it(tmp_path):
     mine = tmp_path / "mine.yaml"
 
     def key(scenario, overlay):
-        tasks._fingerprint.cache_clear()
+        trials._fingerprint.cache_clear()
         gains.write_text(f"gains: {{waist_yaw: {overlay}}}\n")
         mine.write_text(f"extends: drumming\n{scenario}\n")
-        return trial_key(tasks.look(str(mine), XY, 1))
+        return trial_key(trials.look(str(mine), XY, 1))
 
     control = f"control: {{overlays: [{gains}]}}"
     one = "{kP: 1.0e+6, kI: 1.0e+5, kD: 1.0e+4, kF: 4.0e-6}"
@@ -133,4 +133,29 @@ def test_a_trial_is_known_by_all_that_determines_it(tmp_path):
     # How a skill is learned is no part of a trial: it is given the outcome.
     learning = "skill: {n_hidden: 30}\ntransfer: {mapping: similarity}"
     assert key(f"{control}\n{learning}", one) == first
-    tasks._fingerprint.cache_clear()
+    trials._fingerprint.cache_clear()
+
+
+def test_results_go_to_the_store_and_back(demonstration):
+    plain, arrays = demonstration
+    typed = results.unpack("demonstration", plain, arrays)
+    assert typed.xy == XY
+    again, more = results.pack(typed)
+    assert again == plain
+    for name, array in arrays.items():
+        np.testing.assert_array_equal(more[name], array)
+    with pytest.raises(InputError, match="'dance'"):
+        results.unpack("dance", plain, arrays)
+
+
+def test_runners_can_be_handed_in():
+    """For trials that are watched, for instance."""
+
+    class Watched:
+        def gaze(self, xy, seed):
+            return GazeOutcome(True, np.array([0.25, seed]), 1.5)
+
+    found = trials.run_trial(
+        trials.look("drumming", XY, 3), {"drumming": Watched()}
+    )
+    assert found == results.GazeResult(True, [0.25, 3.0], 1.5)

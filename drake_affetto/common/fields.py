@@ -1,0 +1,72 @@
+"""Fields of dataclasses that carry their own range and help.
+
+One declaration serves the check of a value and the command's option.
+"""
+
+import dataclasses
+from typing import Any
+
+from drake_affetto.common.errors import require_range
+
+
+def number(
+    default: Any,
+    low: float,
+    high: float,
+    help: str = "",
+    *,
+    metavar: str = "N",
+    aliases: tuple[str, ...] = (),
+) -> Any:
+    """A field that holds a number, or a tuple of numbers, in [low, high].
+
+    Args:
+        default: Default of the field.
+        low: Least number.
+        high: Greatest number.
+        help: Help of the command's option; without it there is no option.
+        metavar: Name of the value in the help.
+        aliases: Earlier names of the option, which go on working.
+    """
+    return dataclasses.field(
+        default=default,
+        metadata={
+            "range": (low, high),
+            "help": help,
+            "metavar": metavar,
+            "aliases": aliases,
+        },
+    )
+
+
+def option(
+    default: Any,
+    help: str,
+    *,
+    metavar: str | None = None,
+    aliases: tuple[str, ...] = (),
+) -> Any:
+    """A field without a range that is an option of the command."""
+    return dataclasses.field(
+        default=default,
+        metadata={"help": help, "metavar": metavar, "aliases": aliases},
+    )
+
+
+def option_name(field: dataclasses.Field) -> str:
+    """Name of the field's option, which errors use too: --test-positions."""
+    return "--" + field.name.replace("_", "-")
+
+
+def check_ranges(obj: Any) -> None:
+    """Raises InputError for the first field of `obj` outside its range."""
+    for field in dataclasses.fields(obj):
+        if "range" not in field.metadata:
+            continue
+        value = getattr(obj, field.name)
+        name = field.name
+        if field.metadata["help"]:
+            name = option_name(field)
+        for each in value if isinstance(value, tuple) else (value,):
+            if each is not None:
+                require_range(name, each, *field.metadata["range"])

@@ -1,0 +1,210 @@
+"""How much each study does.
+
+Nothing heavy is imported here: a command's help shows a plan's defaults.
+"""
+
+import dataclasses
+
+from drake_affetto.common.errors import require, require_range
+from drake_affetto.common.fields import check_ranges, number, option
+from drake_affetto.skill.scheme_names import PAPER_SCHEMES, STUDY_SCHEMES
+
+GREATEST_SEED = 2**31 - 1
+
+
+@dataclasses.dataclass(frozen=True)
+class DrumPlan:
+    """How much the drumming study does.
+
+    Attributes:
+        demonstrations: Number of demonstrations of a repeat.
+        evaluations: Number of test positions, the same throughout the study.
+        repeats: Number of times that all of it is done, each with other
+            demonstrations.
+        active: Whether the skill's own order is tried too.
+        after: Numbers of demonstrations after which the skill is tested; empty
+            for every one. After the last it always is.
+        scenario: Scenario, by name or path.
+        seed: Seed of everything that is random.
+    """
+
+    demonstrations: int = number(
+        25, 3, 1000, "number of demonstrations in direct view"
+    )
+    evaluations: int = number(
+        10, 1, 1000, "number of test positions, which were not demonstrated"
+    )
+    repeats: int = number(
+        1, 1, 1000, "independent repeats, each with other demonstrations"
+    )
+    active: bool = option(
+        False, "also let the skill choose which demonstration comes next"
+    )
+    after: tuple[int, ...] = number(
+        (), 1, 1000, "test the skill only after so many demonstrations"
+    )
+    scenario: str = option("drumming", "scenario, by name or YAML file")
+    seed: int = number(0, 0, GREATEST_SEED, "seed of everything that is random")
+
+    def check(self) -> None:
+        """Raises InputError for the first value that does not fit."""
+        check_ranges(self)
+        for count in self.after:
+            require_range("--after", count, 1, self.demonstrations)
+
+    @property
+    def tested_after(self) -> list[int]:
+        """Numbers of demonstrations after which the skill is tested."""
+        every = range(1, self.demonstrations + 1)
+        return sorted({*(self.after or every), self.demonstrations})
+
+
+@dataclasses.dataclass(frozen=True)
+class MirrorPlan:
+    """What is compared in a changed view, and how often.
+
+    Attributes:
+        scenario: Scenario of the changed view, by name or path.
+        samples: Numbers of demonstrations that the schemes are given.
+        repeats: Number of times that all of it is done, each with another
+            skill, other demonstrations and other test positions.
+        evaluations: Number of test positions of a repeat.
+        demonstrations: Number of demonstrations in direct view, from which
+            the skill is learned.
+        pool: Number of demonstrations in the changed view, from which samples
+            are drawn; None for the paper's 6, or as many as the most samples.
+        schemes: Schemes that are compared, see `STUDY_SCHEMES`.
+        choice: How samples are chosen, at "random" or "spread" out.
+        variability: Factor of the teacher's variation.
+        workspace: Share of the region's length and width that is used.
+        direct: Scenario in which the skill is learned.
+        name: Name of this plan among others in one store, for display.
+        seed: Seed of everything that is random.
+    """
+
+    scenario: str = "mirror"
+    samples: tuple[int, ...] = number(
+        (3, 4, 5), 2, 100, "numbers of demonstrations that schemes are given"
+    )
+    repeats: int = number(
+        10, 1, 1000, "independent repeats, each with another skill and teacher"
+    )
+    evaluations: int = number(6, 1, 1000, "number of test positions a repeat")
+    demonstrations: int = number(
+        25, 3, 1000, "number of demonstrations in direct view"
+    )
+    pool: int | None = None
+    schemes: tuple[str, ...] = STUDY_SCHEMES
+    choice: str = "random"
+    variability: float = number(1.0, 0.0, 10.0)
+    workspace: float = number(1.0, 0.05, 1.0)
+    direct: str = "drumming"
+    name: str = ""
+    seed: int = number(0, 0, GREATEST_SEED, "seed of everything that is random")
+
+    @property
+    def pool_size(self) -> int:
+        """Number of demonstrations to choose from."""
+        return max(6, *self.samples) if self.pool is None else self.pool
+
+    def check(self) -> None:
+        """Raises InputError for the first value that does not fit."""
+        check_ranges(self)
+        require(
+            len(set(self.samples)) == len(self.samples) > 0,
+            "--samples",
+            list(self.samples),
+            "numbers of samples, each once",
+        )
+        require_range("pool", self.pool_size, max(self.samples), 1000)
+        require(
+            self.choice in ("random", "spread"),
+            "choice",
+            self.choice,
+            "'random' or 'spread'",
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class DemoPlan:
+    """How much the demo does.
+
+    Attributes:
+        demonstrations: Number of demonstrations in direct view.
+        evaluations: Number of test positions in direct view.
+        samples: Number of demonstrations before the mirror.
+        mirror_evaluations: Number of test positions before the mirror.
+        seed: Seed of everything that is random.
+    """
+
+    demonstrations: int = 12
+    evaluations: int = 8
+    samples: int = 5
+    mirror_evaluations: int = 5
+    seed: int = number(0, 0, GREATEST_SEED, "seed of everything that is random")
+
+    @property
+    def drum(self) -> DrumPlan:
+        """The study in direct view."""
+        return DrumPlan(
+            demonstrations=self.demonstrations,
+            evaluations=self.evaluations,
+            # Only the skill that knows them all is tested.
+            after=(self.demonstrations,),
+            seed=self.seed,
+        )
+
+    @property
+    def mirror(self) -> MirrorPlan:
+        """The study before the mirror, which learns the same skill."""
+        return MirrorPlan(
+            samples=(self.samples,),
+            repeats=1,
+            evaluations=self.mirror_evaluations,
+            demonstrations=self.demonstrations,
+            pool=self.samples,
+            schemes=(*PAPER_SCHEMES, "transfer_default"),
+            seed=self.seed,
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class TeachPlan:
+    """How many demonstrations are taught into a file.
+
+    Attributes:
+        demonstrations: Number of positions of the drum.
+        scenario: Scenario, by name or path.
+        seed: Seed of the positions and the teacher.
+    """
+
+    demonstrations: int = number(
+        25,
+        1,
+        # Each position has a seed of its own, counted from seed * SEEDS on.
+        100_000,
+        "number of positions of the drum, a demonstration at each",
+        aliases=("positions",),
+    )
+    scenario: str = option("drumming", "scenario, by name or YAML file")
+    seed: int = number(0, 0, GREATEST_SEED, "seed of everything that is random")
+
+
+@dataclasses.dataclass(frozen=True)
+class ToyPlan:
+    """How much the toy experiment does.
+
+    Attributes:
+        repeats: Number of choices of five points for each seed, as in the
+            paper.
+        seeds: Number of draws of data and hidden layer.
+        seed: The first of the seeds.
+    """
+
+    repeats: int = number(
+        100, 1, 100_000, "choices of five points for each seed, as in the paper"
+    )
+    seeds: int = number(
+        20, 1, 100_000, "draws of data and hidden layer, one seed each"
+    )
+    seed: int = number(0, 0, GREATEST_SEED, "the first of the seeds")

@@ -1,0 +1,80 @@
+"""Options that come from a plan, and those that studies share."""
+
+import argparse
+import dataclasses
+
+import pytest
+
+from drake_affetto.cli import options
+from drake_affetto.cli.main import main, make_parser
+from drake_affetto.common.errors import InputError
+from drake_affetto.common.fields import number, option
+from drake_affetto.experiments.plans import DrumPlan, TeachPlan
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    repeats: int = number(2, 1, 10, "how often", aliases=("times",))
+    after: tuple[int, ...] = number((), 1, 9, "after which")
+    active: bool = option(False, "whether")
+    hidden: int = number(5, 1, 9)
+
+
+def parse(*words):
+    parser = argparse.ArgumentParser()
+    options.add_plan_arguments(parser, Plan)
+    return options.make_plan(Plan, parser.parse_args(words), hidden=7)
+
+
+def test_options_make_the_plan():
+    assert parse() == Plan(2, (), False, 7)
+    assert parse("--repeats", "3", "--after", "1", "4", "--active") == Plan(
+        3, (1, 4), True, 7
+    )
+
+
+def test_earlier_names_work_but_are_not_shown():
+    assert parse("--times", "4").repeats == 4
+    parser = argparse.ArgumentParser()
+    options.add_plan_arguments(parser, Plan)
+    assert "--times" not in parser.format_help()
+    assert "--repeats" in parser.format_help()
+
+
+@pytest.mark.parametrize(
+    ("command", "words", "name", "value"),
+    [
+        ("teach", ["--out", "x", "--positions", "7"], "demonstrations", 7),
+        ("teach", ["--out", "x", "--by-hand"], "mouse", True),
+        ("mirror", ["--no-exhibits"], "no_media", True),
+    ],
+)
+def test_options_of_version_0_1_0_go_on_working(command, words, name, value):
+    parser = make_parser(command)
+    args = parser.parse_args([command, *words])
+    assert getattr(args, name) == value
+    fewer = parser.parse_args(
+        [command, *words[:2]] if name != "no_media" else [command]
+    )
+    assert getattr(fewer, name) != value
+
+
+def test_their_names_are_not_in_the_help(capsys):
+    for command in ("teach", "mirror"):
+        assert main([command, "--help"]) == 0
+        shown = capsys.readouterr().out
+        for old in ("--positions", "--by-hand", "--no-exhibits"):
+            assert old not in shown
+
+
+def test_the_plans_defaults_are_the_commands():
+    args = make_parser("drum").parse_args(["drum"])
+    assert options.make_plan(DrumPlan, args) == DrumPlan()
+    args = make_parser("teach").parse_args(["teach", "--out", "x"])
+    assert options.make_plan(TeachPlan, args) == TeachPlan()
+
+
+def test_worker_count_has_limits():
+    assert options.worker_count(argparse.Namespace(workers=None)) == 2
+    with pytest.raises(InputError, match="--workers is 257"):
+        options.worker_count(argparse.Namespace(workers=257))
