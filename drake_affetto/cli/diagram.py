@@ -1,35 +1,27 @@
 """`affetto diagram`: draws a station's systems and their connections."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from drake_affetto.common.errors import require
-from drake_affetto.common.output import (
-    prepare_output,
-)
-from drake_affetto.station.diagram_drawing import _check_suffix, write_diagram
-
-if TYPE_CHECKING:
-    pass
+from drake_affetto.common.output import prepare_output
+from drake_affetto.station.diagram_drawing import check_suffix, write_diagram
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `affetto diagram`."""
+    """Declares the command's options."""
     parser.add_argument(
         "--scenario",
         metavar="NAME",
         default="drumming",
-        help="a scenario's name, or its YAML file",
+        help="scenario, by name or YAML file",
     )
     parser.add_argument(
         "--out",
         metavar="FILE",
         type=Path,
         default=Path("out/diagram.svg"),
-        help="the picture (.svg, .png, .pdf) or its source (.dot, .gv)",
+        help="picture (.svg, .png, .pdf) or its source (.dot, .gv)",
     )
     parser.add_argument(
         "--depth",
@@ -46,9 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Builds the scenario's station and draws it."""
-    path = _check_suffix(args.out)
+    """Builds the scenario's station and draws it; returns the exit code."""
+    path = check_suffix(args.out)
     require(args.depth >= 0, "--depth", args.depth, "0 or more")
+
     from drake_affetto.station.scenario import load_scenario
     from drake_affetto.station.station import AffettoStation
 

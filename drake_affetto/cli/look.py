@@ -1,52 +1,37 @@
 """`affetto look`: shows what the camera sees, and calibrates it."""
 
 import argparse
-from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
-from pydrake.systems.framework import Context
-
+from drake_affetto.cli.options import add_output_argument, add_seed_argument
 from drake_affetto.common.errors import require_range
 from drake_affetto.common.output import prepare_output
-from drake_affetto.experiments.camera_preview import (
-    Array,
-    Sight,
-    calibration_yaml,
-    draw_view,
-    make_sight,
-    turn_to,
-    write_gaze_video,
-    write_image,
-)
-from drake_affetto.station.scenario import load_scenario
-from drake_affetto.station.station import AffettoStation
+
+if TYPE_CHECKING:
+    from pydrake.systems.framework import Context
+
+    from drake_affetto.common.typing import Array
+    from drake_affetto.experiments.camera_preview import Sight
+    from drake_affetto.station.station import AffettoStation
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of `affetto look`."""
+    """Declares the command's options."""
     parser.add_argument(
         "scenario",
         nargs="?",
         default="drumming",
-        help="a scenario's name, or its YAML file",
+        help="scenario, by name or YAML file",
     )
     parser.add_argument(
         "--drum",
         metavar=("X", "Y"),
         nargs=2,
         type=float,
-        help="where the drum stands [m]; the middle of its region if absent",
+        help="position of the drum, m; the middle of its region by default",
     )
-    parser.add_argument(
-        "--out",
-        metavar="DIR",
-        type=Path,
-        default=Path("out/look"),
-        help="folder for the pictures",
-    )
-    parser.add_argument(
-        "--seed", type=int, default=0, help="of the camera's noise"
-    )
+    add_output_argument(parser, "out/look")
+    add_seed_argument(parser, "seed of the camera's noise")
     parser.add_argument(
         "--video",
         action="store_true",
@@ -61,8 +46,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Draws what the scenario's camera sees."""
+    """Draws what the scenario's camera sees; returns the exit code."""
     require_range("--seed", args.seed, 0, 2**31 - 1)
+
+    import numpy as np
+
+    from drake_affetto.experiments.camera_preview import (
+        calibration_yaml,
+        draw_view,
+        make_sight,
+        turn_to,
+        write_gaze_video,
+        write_image,
+    )
+    from drake_affetto.station.scenario import load_scenario
+    from drake_affetto.station.station import AffettoStation
+
     scenario = load_scenario(args.scenario)
     if args.calibrate:
         station = AffettoStation(scenario)
@@ -105,10 +104,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _print_findings(
-    station: AffettoStation,
-    context: Context,
-    sight: Sight,
-    xy: Array,
+    station: "AffettoStation",
+    context: "Context",
+    sight: "Sight",
+    xy: "Array",
     yaw: float,
 ) -> None:
     pixels = station.GetOutputPort("camera.blob_pixels").Eval(context)

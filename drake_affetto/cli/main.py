@@ -25,18 +25,23 @@ COMMANDS = {
     "demo": "teach, drum, look through the mirror, transfer",
     "drum": "learn to drum from demonstrations (Fig. 3)",
     "mirror": "drum in a changed view, by transfer (Fig. 5)",
-    "teach": "teach the robot by hand, into a file",
+    "teach": "record demonstrations in a file",
     "look": "show what the camera sees; calibrate it",
     "toy": "the paper's toy experiment of transfer (Fig. 2)",
     "report": "the results of studies as one page",
     "identify": "fit the actuators to a robot's logs",
     "tune": "tune the controllers' gains on the whole robot",
-    "status": "tell how far a study has come",
+    "status": "show how far a study is",
     "view": "show the robot in a browser, with sliders",
     "diagram": "draw a station's systems and their connections",
 }
 
 _PROGRAM = "affetto"
+
+# How many threads linear algebra uses. Sums differ in the last digit with
+# their number, so that the same seed gives the same numbers only with one; and
+# the worker processes use the other cores.
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -64,7 +69,7 @@ def make_parser(command: str | None = None) -> argparse.ArgumentParser:
     parser = _Parser(
         prog=_PROGRAM,
         description="The drumming child robot Affetto in simulation.",
-        epilog=f"`{_PROGRAM} COMMAND --help` tells a command's options.",
+        epilog=f"`{_PROGRAM} COMMAND --help` lists the options of a command.",
         allow_abbrev=False,
     )
     parser.add_argument(
@@ -91,6 +96,9 @@ def make_parser(command: str | None = None) -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command in `argv` (sys.argv[1:]) and returns its exit code."""
     argv = sys.argv[1:] if argv is None else argv
+    for name in _THREADS:
+        # Before numpy is imported, which reads it then.
+        os.environ.setdefault(name, "1")
     try:
         try:
             args = make_parser(_chosen(argv)).parse_args(argv)

@@ -3,11 +3,13 @@
 import argparse
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drake_affetto.cli.options import STORE
 from drake_affetto.common.errors import InputError
-from drake_affetto.runner.store import TrialStore
+
+if TYPE_CHECKING:
+    from drake_affetto.runner.store import TrialStore
 
 # The rate is that of the last so many trials.
 _RECENT = 30
@@ -33,6 +35,8 @@ def run(args: argparse.Namespace) -> int:
 
     from rich.console import Console
 
+    from drake_affetto.runner.store import TrialStore
+
     console = Console()
     for path in paths:
         with TrialStore(path, read_only=True) as store:
@@ -49,7 +53,7 @@ def rate(finished_at: list[str]) -> float | None:
     return (len(recent) - 1) / seconds if seconds > 0.0 else None
 
 
-def _print(folder: Path, store: TrialStore, console: Any) -> None:
+def _print(folder: Path, store: "TrialStore", console: Any) -> None:
     from rich.table import Table
 
     stages = store.stages()

@@ -8,7 +8,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scenario",
         default="drumming",
-        help="a scenario's name, or a YAML file",
+        help="scenario, by name or YAML file",
     )
     parser.add_argument(
         "--frames",
@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=None,
         metavar="SECONDS",
-        help="stop by itself after that time",
+        help="stop by itself after this time",
     )
 
 
@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
         time_limit=args.time_limit,
         frames=args.frames,
     )
-    print("The posture it was left in [rad]:")
+    print("The last posture, rad:")
     for name, angle in posture.items():
         print(f"  {name}: {angle:.3f}")
     return 0

@@ -1,25 +1,21 @@
 """The parameterised skill (an ELM) and its transfer to a new view."""
 
-from drake_affetto.skill.adapters import input_jacobian
-from drake_affetto.skill.elm import ElmRegressor
-from drake_affetto.skill.mappings import Affine, Domain, Mapping, Similarity
-from drake_affetto.skill.schemes import SCHEMES, make_scheme
-from drake_affetto.skill.transfer import (
-    Start,
-    TransferRegressor,
-    loo_covariance,
-)
+from drake_affetto.common.lazy import attach
 
-__all__ = [
-    "SCHEMES",
-    "Affine",
-    "Domain",
-    "ElmRegressor",
-    "Mapping",
-    "Similarity",
-    "Start",
-    "TransferRegressor",
-    "input_jacobian",
-    "loo_covariance",
-    "make_scheme",
-]
+__getattr__, __dir__, __all__ = attach(
+    __name__,
+    {
+        "SCHEMES": "scheme_names",
+        "Affine": "mappings",
+        "Domain": "mappings",
+        "ElmRegressor": "elm",
+        "Mapping": "mappings",
+        "Similarity": "mappings",
+        "SkillPolicy": "policy",
+        "Start": "transfer",
+        "TransferRegressor": "transfer",
+        "input_jacobian": "adapters",
+        "loo_covariance": "transfer",
+        "make_scheme": "schemes",
+    },
+)

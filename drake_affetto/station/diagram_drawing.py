@@ -166,7 +166,7 @@ def write_diagram(
         InputError: for another suffix, a negative depth, or a file that cannot
             be written.
     """
-    path = _check_suffix(path)
+    path = check_suffix(path)
     source = graphviz_source(system, max_depth=max_depth, all_ports=all_ports)
     if path.suffix.lower() in SOURCE_SUFFIXES:
         write_text_atomic(path, source)
@@ -179,7 +179,7 @@ def write_diagram(
     return path
 
 
-def _check_suffix(path: str | Path) -> Path:
+def check_suffix(path: str | Path) -> Path:
     path = Path(path).expanduser()
     known = IMAGE_SUFFIXES + SOURCE_SUFFIXES
     if path.suffix.lower() not in known:

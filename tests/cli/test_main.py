@@ -27,21 +27,62 @@ def command(monkeypatch):
     return register
 
 
-def test_help_lists_the_commands_and_imports_nothing_heavy():
+# What takes long to import; a help needs none of it.
+HEAVY = {
+    *("numpy", "scipy", "pydrake", "cv2", "numba", "sklearn", "rich", "yaml"),
+    *("optuna", "plotly", "h5py", "matplotlib"),
+}
+
+
+def help_and_heavy_modules(*words):
+    """What `affetto WORDS --help` prints, and the heavy modules it imports."""
     code = (
         "import sys; from drake_affetto.cli import main as cli;"
-        "code = cli.main(['-h']);"
-        "heavy = {'numpy', 'scipy', 'pydrake', 'cv2', 'numba', 'rich'};"
-        "print(sorted(heavy & set(sys.modules)), file=sys.stderr);"
+        "code = cli.main([*sys.argv[1:], '--help']);"
+        f"print(*sorted({HEAVY!r} & set(sys.modules)), file=sys.stderr);"
         "sys.exit(code)"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True
+        [sys.executable, "-c", code, *words], capture_output=True, text=True
     )
-    assert (done.returncode, done.stderr) == (0, "[]\n")
+    assert done.returncode == 0, done.stderr
+    return done.stdout, done.stderr.split()
+
+
+def test_help_lists_the_commands_and_imports_nothing_heavy():
+    text, heavy = help_and_heavy_modules()
+    assert heavy == []
     for name, summary in cli.COMMANDS.items():
-        assert name in done.stdout
-        assert summary.split()[0] in done.stdout
+        assert name in text
+        assert summary.split()[0] in text
+
+
+@pytest.mark.parametrize("name", sorted({*cli.COMMANDS} - {"identify", "tune"}))
+def test_help_of_a_command_imports_nothing_heavy(name):
+    text, heavy = help_and_heavy_modules(name)
+    assert f"affetto {name}" in text
+    assert heavy == []
+
+
+@pytest.mark.parametrize("mine", [None, "3"])
+def test_linear_algebra_uses_one_thread_unless_told_otherwise(mine):
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+    environment = {k: v for k, v in os.environ.items() if k not in names}
+    if mine is not None:
+        environment |= dict.fromkeys(names, mine)
+    code = (
+        "import os, sys; from drake_affetto.cli import main as cli;"
+        "cli.main(['--version']);"
+        "assert 'numpy' not in sys.modules;"
+        f"print(*(os.environ[name] for name in {names!r}))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
+    assert done.stdout.split()[-2:] == [mine or "1"] * 2
 
 
 @pytest.mark.parametrize("name", list(cli.COMMANDS))
