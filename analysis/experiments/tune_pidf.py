@@ -21,8 +21,9 @@ import numpy as np
 from drake_affetto.common.errors import require_file
 from drake_affetto.common.output import atomic_path
 from drake_affetto.control.pidf import load_control
-from drake_affetto.tuning.references import HELD_OUT, TEST
-from drake_affetto.tuning.study import bench, load_plan, run_reference
+from drake_affetto.tuning.config import HELD_OUT, TRAINING
+from drake_affetto.tuning.environment import environment, run_reference
+from drake_affetto.tuning.plan import load_plan
 
 DESIRED, BEFORE, AFTER = "0.55", "#d55e00", "#0072b2"
 
@@ -31,7 +32,7 @@ def main() -> None:
     """Writes TRAJECTORY.png into the folder of the study, or --figure."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--study", default="out/tune", help="study's folder")
-    parser.add_argument("--trajectory", default=TEST, choices=[TEST, *HELD_OUT])
+    parser.add_argument("--trajectory", default=TRAINING, choices=[TRAINING, *HELD_OUT])
     parser.add_argument("--figure", help="image file to write")
     args = parser.parse_args()
     folder = Path(args.study)
@@ -45,7 +46,7 @@ def main() -> None:
         start=results["start"],
         tuning=results["tuning"],
     )
-    robot = bench(plan)
+    robot = environment(plan)
     reference = robot.reference(args.trajectory)
     runs = [
         run_reference(

@@ -7,13 +7,9 @@ from drake_affetto.common.errors import require_range
 from drake_affetto.common.output import (
     prepare_output,
 )
-from drake_affetto.tuning.references import (
-    DEFAULT_FILE,
-    HELD_OUT,
-    TEST,
-)
-from drake_affetto.tuning.results import START_FILE
-from drake_affetto.tuning.study import load_plan, run_tune
+from drake_affetto.tuning.config import DEFAULT_FILE, HELD_OUT, TRAINING
+from drake_affetto.tuning.plan import START_FILE, load_plan
+from drake_affetto.tuning.study import run_tune
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -109,7 +105,7 @@ def _print_table(results: dict[str, Any], console: Any) -> None:
     hand, best = results["hand_tuned"], results["best"]
     table = Table(title="Tracking error, rms in degrees: by hand → tuned")
     table.add_column("joint")
-    names = (TEST, *HELD_OUT)
+    names = (TRAINING, *HELD_OUT)
     for name in names:
         table.add_column(name.replace("_", " "), justify="right")
     table.add_column("at rest [% of range]", justify="right")

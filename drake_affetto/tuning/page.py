@@ -14,13 +14,9 @@ from plotly.offline import get_plotlyjs
 from plotly.subplots import make_subplots
 
 from drake_affetto.common.output import write_text_atomic
-from drake_affetto.tuning.references import HELD_OUT, REST, TEST
-from drake_affetto.tuning.results import (
-    GAINS,
-    Assessment,
-    TunePlan,
-    parameter_names,
-)
+from drake_affetto.tuning.config import HELD_OUT, REST, TRAINING
+from drake_affetto.tuning.plan import GAINS, TunePlan, parameter_names
+from drake_affetto.tuning.results import Evaluation
 
 # Colours that can be told apart, also by the colour-blind, on light and dark.
 _DESIRED, _BEFORE, _AFTER = "#888888", "#d55e00", "#0091d5"
@@ -96,7 +92,7 @@ drawAll();
 """
 
 _TITLES = {
-    TEST: "Test trajectory: sines and steps",
+    TRAINING: "Test trajectory: sines and steps",
     "chirp": "Held out: chirp",
     "strokes": "Held out: strokes",
     "trapezoids": "Held out: trapezoids",
@@ -109,7 +105,7 @@ def write_page(
     plan: TunePlan,
     study: optuna.Study,
     results: dict[str, Any],
-    assessment: Assessment,
+    evaluation: Evaluation,
 ) -> None:
     """Writes the page of a finished study to `path`."""
     names = list(results["hand_tuned"]["gains"])
@@ -119,8 +115,8 @@ def write_page(
     figures: dict[str, Any] = {
         "history": _history(trials, results),
         **{
-            name: _traces(names, assessment, name)
-            for name in (TEST, *HELD_OUT, REST)
+            name: _traces(names, evaluation, name)
+            for name in (TRAINING, *HELD_OUT, REST)
         },
     }
     if importance is not None:
@@ -219,7 +215,7 @@ def _summary(results: dict[str, Any], complete: list[FrozenTrial]) -> str:
     hand, best = results["hand_tuned"], results["best"]
 
     def mean_error(side: dict[str, Any]) -> float:
-        errors = side["trajectories"][TEST]["tracking_error_deg"]
+        errors = side["trajectories"][TRAINING]["tracking_error_deg"]
         return float(np.mean(list(errors.values())))
 
     rest = max(best["rest_oscillation_percent"].values())
@@ -258,7 +254,7 @@ def _summary(results: dict[str, Any], complete: list[FrozenTrial]) -> str:
 
 
 def _error_table(results: dict[str, Any]) -> str:
-    columns = (TEST, *HELD_OUT)
+    columns = (TRAINING, *HELD_OUT)
     head = "".join(f"<th>{_label(name)}</th>" for name in columns)
     rows = []
     hand, best = results["hand_tuned"], results["best"]
@@ -384,9 +380,9 @@ def _importance_text(share: np.ndarray | None) -> str:
 
 
 def _traces(
-    names: Sequence[str], assessment: Assessment, name: str
+    names: Sequence[str], evaluation: Evaluation, name: str
 ) -> go.Figure:
-    reference = assessment.references[name]
+    reference = evaluation.references[name]
     step = max(
         1, round(1.0 / (_TRACE_RATE * (reference.t[1] - reference.t[0])))
     )
@@ -398,7 +394,7 @@ def _traces(
         vertical_spacing=0.25 / max(len(names), 2) / 2,
         subplot_titles=[_label(n) for n in names],
     )
-    before, after = assessment.runs[name]
+    before, after = evaluation.runs[name]
     for i in range(len(names)):
         for q, label, colour, width in (
             (reference.q, "desired", _DESIRED, 2.5),

@@ -8,26 +8,25 @@ import numpy as np
 import pytest
 
 from drake_affetto.common.errors import InputError
-from drake_affetto.tuning.references import (
+from drake_affetto.tuning.cma_es import EvaluatedCandidate, JointwiseCmaEs
+from drake_affetto.tuning.config import (
     HELD_OUT,
     REST,
-    TEST,
+    TRAINING,
     CostWeights,
-    Evaluation,
-    Excursion,
-    JointwiseCmaEs,
-    Reference,
     TuningConfig,
-    excursion,
-    joint_costs,
     load_tuning,
+)
+from drake_affetto.tuning.costs import joint_costs, rest_deviation, rest_std
+from drake_affetto.tuning.references import (
+    JointRange,
+    Reference,
+    joint_range,
     make_reference,
     minimum_jerk,
-    rest_deviation,
-    rest_std,
 )
 
-NAMES = (TEST, *HELD_OUT, REST)
+NAMES = (TRAINING, *HELD_OUT, REST)
 
 
 def space_of(n, seed=0):
@@ -35,7 +34,7 @@ def space_of(n, seed=0):
     low = rng.uniform(-1.0, 0.0, n)
     high = low + rng.uniform(0.3, 2.0, n)
     start = low + rng.uniform(0.0, 1.0, n) * (high - low)
-    return Excursion(start, low, high)
+    return JointRange(start, low, high)
 
 
 # --- references
@@ -68,12 +67,12 @@ def test_references_keep_to_their_space(name, n, seed):
 @pytest.mark.parametrize("name", NAMES)
 def test_references_use_the_room_that_there_is(name):
     low, high = -np.ones(8), np.linspace(0.5, 2.0, 8)
-    space = Excursion(0.5 * (low + high), low, high)
+    space = JointRange(0.5 * (low + high), low, high)
     q = make_reference(name, TuningConfig(), space).q
     assert np.all(np.ptp(q, axis=0) > 0.25 * (high - low))
 
 
-@pytest.mark.parametrize("name", [TEST, *HELD_OUT])
+@pytest.mark.parametrize("name", [TRAINING, *HELD_OUT])
 def test_references_end_at_rest_where_they_began(name):
     space = space_of(8)
     reference = make_reference(name, TuningConfig(), space)
@@ -97,7 +96,7 @@ def test_sines_of_no_two_joints_share_a_frequency():
     config.sines.duration = 40.0
     config.sines.share = 0.0
     n = 8
-    q = make_reference(TEST, config, space_of(n)).q
+    q = make_reference(TRAINING, config, space_of(n)).q
     # The sines alone, between settling, the way there, and the steps.
     rate = config.sample_rate
     first = round((config.settling + config.approach) * rate)
@@ -111,7 +110,7 @@ def test_sines_of_no_two_joints_share_a_frequency():
 
 def test_held_out_references_are_others():
     config, space = TuningConfig(), space_of(4)
-    test = make_reference(TEST, config, space).q
+    test = make_reference(TRAINING, config, space).q
     for name in HELD_OUT:
         q = make_reference(name, config, space).q
         length = min(len(q), len(test))
@@ -151,14 +150,14 @@ def test_minimum_jerk_rests_at_both_ends():
 def test_excursions_keep_a_margin_and_hold_the_start():
     config = TuningConfig(margin=0.1, reach=0.3)
     lower, upper = np.array([0.0, 0.0, 0.0]), np.array([1.0, 1.0, 1.0])
-    space = excursion(config, ["a", "b", "c"], [0.5, 0.05, 0.95], lower, upper)
+    space = joint_range(config, ["a", "b", "c"], [0.5, 0.05, 0.95], lower, upper)
     np.testing.assert_allclose(space.low, [0.2, 0.05, 0.65])
     np.testing.assert_allclose(space.high, [0.8, 0.35, 0.95])
 
 
 def test_a_named_excursion_is_taken():
     config = TuningConfig(excursions={"b": [0.1, 0.7]})
-    space = excursion(config, ["a", "b"], [0.5, 0.5], [0, 0], [1, 1])
+    space = joint_range(config, ["a", "b"], [0.5, 0.5], [0, 0], [1, 1])
     assert (space.low[1], space.high[1]) == (0.1, 0.7)
 
 
@@ -166,7 +165,7 @@ def test_a_named_excursion_is_taken():
 def test_an_excursion_that_does_not_fit_is_told(pair):
     config = TuningConfig(excursions={"b": pair})
     with pytest.raises(InputError, match=r"excursions\.b"):
-        excursion(config, ["a", "b"], [0.5, 0.5], [0, 0], [1, 1])
+        joint_range(config, ["a", "b"], [0.5, 0.5], [0, 0], [1, 1])
 
 
 # --- the cost
@@ -180,7 +179,7 @@ def still(duration=4.0, n=2, rate=100.0):
 
 
 def test_following_exactly_with_closed_valves_costs_nothing():
-    reference = make_reference(TEST, TuningConfig(), space_of(3))
+    reference = make_reference(TRAINING, TuningConfig(), space_of(3))
     costs = joint_costs(
         reference,
         reference.q,
@@ -300,7 +299,7 @@ def run_search(dut, goal, count, scale=1.0, history=None):
     for k in range(count):
         if k not in history:
             x = dut.ask(k, history)
-            history[k] = Evaluation(x, bowl(x, goal, scale))
+            history[k] = EvaluatedCandidate(x, bowl(x, goal, scale))
     return history
 
 

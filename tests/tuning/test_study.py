@@ -20,16 +20,13 @@ import yaml
 from drake_affetto.cli.main import main
 from drake_affetto.control.pidf import load_control
 from drake_affetto.station.scenario import load_scenario
-from drake_affetto.tuning.references import HELD_OUT, REST, TEST, rest_std
-from drake_affetto.tuning.results import GAINS, START_FILE, TunePlan
-from drake_affetto.tuning.study import (
-    bench,
-    load_plan,
-    mirrored,
-    overlay_text,
-    run_tune,
-    scaled_gains,
-)
+from drake_affetto.tuning.config import HELD_OUT, REST, TRAINING
+from drake_affetto.tuning.costs import rest_std
+from drake_affetto.tuning.environment import environment
+from drake_affetto.tuning.plan import GAINS, START_FILE, TunePlan, load_plan
+from drake_affetto.tuning.results import contralateral, overlay_text
+from drake_affetto.tuning.search import scaled_gains
+from drake_affetto.tuning.study import run_tune
 
 JOINTS = ("right_elbow_rotation", "right_elbow_flexion")
 TRIALS = 8
@@ -98,7 +95,7 @@ def test_the_results_have_the_agreed_form(finished):
     names = load_scenario("drumming").active_joints
     for side in ("hand_tuned", "best"):
         part = results[side]
-        assert set(part["trajectories"]) == {TEST, *HELD_OUT}
+        assert set(part["trajectories"]) == {TRAINING, *HELD_OUT}
         for trajectory in part["trajectories"].values():
             assert list(trajectory["tracking_error_deg"]) == names
         assert list(part["rest_oscillation_percent"]) == names
@@ -111,7 +108,7 @@ def test_the_results_have_the_agreed_form(finished):
 def test_degrees_and_percent_of_range_agree(finished, plan):
     _, results = finished
     part = results["best"]["trajectories"]["chirp"]
-    for joint, span in zip(bench(plan).names, bench(plan).span, strict=True):
+    for joint, span in zip(environment(plan).names, environment(plan).span, strict=True):
         assert part["tracking_error_deg"][joint] == pytest.approx(
             part["tracking_percent"][joint] / 100.0 * np.degrees(span)
         )
@@ -165,7 +162,7 @@ def test_gains_are_an_overlay_that_a_scenario_takes(finished, tmp_path):
     loaded = load_control(control.parameters, tuple(control.overlays))
     plain = load_control()
     for joint in JOINTS:
-        for side in (joint, mirrored(joint)):
+        for side in (joint, contralateral(joint)):
             for gain in GAINS:
                 assert getattr(loaded.gains[side], gain) == pytest.approx(
                     results["best"]["gains"][joint][gain]
@@ -194,8 +191,8 @@ def test_the_page_needs_nothing_else(finished):
         flags=re.S,
     )
     figures = json.loads(data.group(1).replace("<\\/", "</"))
-    assert {"history", TEST, *HELD_OUT} <= set(figures)
-    traces = figures[TEST]["data"]
+    assert {"history", TRAINING, *HELD_OUT} <= set(figures)
+    traces = figures[TRAINING]["data"]
     assert len(traces) == 3 * 8
     for joint in results["best"]["gains"]:
         assert joint.replace("_", " ") in ours
@@ -208,7 +205,7 @@ def test_a_finished_study_is_not_run_again(finished, plan, monkeypatch):
     def refuse(*_):
         raise AssertionError("all trials had been finished")
 
-    monkeypatch.setattr("drake_affetto.tuning.study.run_trial", refuse)
+    monkeypatch.setattr("drake_affetto.tuning.trial.run_trial", refuse)
     again = run_tune(out, plan, trials=TRIALS, workers=0, page=False)
     assert again == results
 
@@ -352,8 +349,8 @@ def test_both_arms_get_the_same_gains():
 @pytest.mark.slow
 def test_the_default_gains_beat_the_hand_tuned_ones_and_rest():
     plan = load_plan(None)
-    robot = bench(plan)
-    reference = robot.reference(TEST)
+    robot = environment(plan)
+    reference = robot.reference(TRAINING)
     tuned, start = (
         control.for_joints(robot.names)
         for control in (load_control(), load_control(START_FILE))

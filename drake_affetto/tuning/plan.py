@@ -1,0 +1,89 @@
+"""TODO."""
+
+from collections.abc import Sequence
+import dataclasses
+
+from drake_affetto.common.errors import require
+from drake_affetto.control.pidf import (
+    load_control,
+)
+from drake_affetto.station.scenario import load_scenario
+from drake_affetto.tuning.config import (
+    DEFAULT_FILE,
+    load_tuning,
+)
+
+START_FILE = "package://drake_affetto/control_hand_tuned.yaml"
+
+GAINS = ("kP", "kI", "kD", "kF")
+
+
+@dataclasses.dataclass(frozen=True)
+class TunePlan:
+    """What determines a tuning study, but for how many trials it has.
+
+    Attributes:
+        joints: whose gains are searched; the others keep those of `start`.
+        seed: of the search.
+        scenario: name or file of the scenario.
+        start: YAML file of the gains that the search starts from.
+        tuning: YAML file of `TuningConfig`.
+    """
+
+    joints: tuple[str, ...]
+    seed: int = 0
+    scenario: str = "drumming"
+    start: str = START_FILE
+    tuning: str = DEFAULT_FILE
+
+
+def parameter_names(joints: Sequence[str]) -> list[str]:
+    """Names of a study's parameters: joint by joint, its gains' factors."""
+    return [f"{joint}.{gain}" for joint in joints for gain in GAINS]
+
+
+def load_plan(
+    joints: Sequence[str] | None,
+    *,
+    seed: int = 0,
+    scenario: str = "drumming",
+    start: str = START_FILE,
+    tuning: str = DEFAULT_FILE,
+) -> TunePlan:
+    """A plan, checked before anything runs.
+
+    Args:
+        joints: active joints of the scenario; None for all of them.
+
+    Raises:
+        InputError: where joints, files or their values do not fit.
+    """
+    loaded = load_scenario(scenario)
+    require(
+        loaded.valve_source == "pidf",
+        "scenario.valve_source",
+        loaded.valve_source,
+        "'pidf', for its gains are tuned",
+    )
+    active = loaded.active_joints
+    chosen = list(active) if joints is None else list(joints)
+    require(len(chosen) > 0, "--joints", chosen, "at least one joint")
+    for joint in chosen:
+        require(
+            joint in active,
+            "--joints",
+            joint,
+            f"active joints of {scenario!r}: {', '.join(active)}",
+        )
+    require(
+        len(set(chosen)) == len(chosen), "--joints", chosen, "no joint twice"
+    )
+    load_control(start).for_joints(active)
+    load_tuning(tuning)
+    return TunePlan(
+        joints=tuple(joint for joint in active if joint in chosen),
+        seed=seed,
+        scenario=scenario,
+        start=start,
+        tuning=tuning,
+    )
