@@ -32,7 +32,9 @@ def main() -> None:
     """Writes TRAJECTORY.png into the folder of the study, or --figure."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--study", default="out/tune", help="study's folder")
-    parser.add_argument("--trajectory", default=TRAINING, choices=[TRAINING, *HELD_OUT])
+    parser.add_argument(
+        "--trajectory", default=TRAINING, choices=[TRAINING, *HELD_OUT]
+    )
     parser.add_argument("--figure", help="image file to write")
     args = parser.parse_args()
     folder = Path(args.study)

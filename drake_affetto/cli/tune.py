@@ -1,15 +1,27 @@
 """`affetto tune`: searches the gains of the controllers on the whole robot."""
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from drake_affetto.common.errors import require_range
-from drake_affetto.common.output import (
-    prepare_output,
+from drake_affetto.cli.options import (
+    add_output_argument,
+    add_restart_argument,
+    add_seed_argument,
+    add_workers_argument,
+    tells_how_to_continue,
+    worker_count,
 )
-from drake_affetto.tuning.config import DEFAULT_FILE, HELD_OUT, TRAINING
-from drake_affetto.tuning.plan import START_FILE, load_plan
-from drake_affetto.tuning.study import run_tune
+from drake_affetto.common.errors import require_range
+from drake_affetto.common.output import prepare_output
+from drake_affetto.tuning.config import (
+    DEFAULT_FILE,
+    HELD_OUT,
+    START_FILE,
+    TRAINING,
+)
+
+if TYPE_CHECKING:
+    from drake_affetto.tuning.results import TuningResults
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,28 +30,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--joints",
         nargs="+",
         metavar="JOINT",
-        help="whose gains are searched; by default all active joints",
+        help="joints whose gains are searched; by default all active ones",
     )
     parser.add_argument(
         "--trials",
         type=int,
         default=216,
         metavar="N",
-        help="how many trials the study shall have in the end",
+        help="number of trials, those of earlier runs included",
     )
+    add_workers_argument(parser)
+    add_output_argument(parser, "out/tune")
+    add_seed_argument(parser, "seed of the search")
     parser.add_argument(
-        "--workers",
-        type=int,
-        default=2,
-        metavar="K",
-        help="worker processes; 0 runs all in this one",
-    )
-    parser.add_argument(
-        "--out", metavar="DIR", default="out/tune", help="where results go"
-    )
-    parser.add_argument("--seed", type=int, default=0, help="of the search")
-    parser.add_argument(
-        "--scenario", default="drumming", help="whose robot is tuned"
+        "--scenario", default="drumming", help="scenario of the robot"
     )
     parser.add_argument(
         "--start",
@@ -53,18 +57,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=DEFAULT_FILE,
         help="trajectories, cost and search",
     )
-    parser.add_argument(
-        "--restart",
-        action="store_true",
-        help="throw away what an earlier run has left in DIR",
-    )
+    add_restart_argument(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs the study; returns the exit code."""
+    """Runs the study; returns the exit code.
+
+    Raises:
+        InputError: If an option, a file or the folder does not fit.
+    """
     require_range("--trials", args.trials, 1, 1_000_000)
-    require_range("--workers", args.workers, 0, 256)
+    workers = worker_count(args)
     require_range("--seed", args.seed, 0, 2**31 - 1)
+
+    from rich.console import Console
+
+    from drake_affetto.tuning.plan import load_plan
+    from drake_affetto.tuning.study import run_tune
+
     plan = load_plan(
         args.joints,
         seed=args.seed,
@@ -73,25 +83,16 @@ def run(args: argparse.Namespace) -> int:
         tuning=args.tuning,
     )
     out = prepare_output(args.out)
-
-    from rich.console import Console
-
     console = Console()
-    try:
+    with tells_how_to_continue(console, out):
         results = run_tune(
             out,
             plan,
             trials=args.trials,
-            workers=args.workers,
+            workers=workers,
             restart=args.restart,
             console=console,
         )
-    except KeyboardInterrupt:
-        console.print(
-            f"Finished trials are kept in {out}; the same command goes on "
-            "from there."
-        )
-        raise
     _print_table(results, console)
     console.print(
         f"Gains, results and the study's page (study.html) are in {out}"
@@ -99,32 +100,34 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _print_table(results: dict[str, Any], console: Any) -> None:
+def _print_table(results: "TuningResults", console: Any) -> None:
     from rich.table import Table
 
-    hand, best = results["hand_tuned"], results["best"]
-    table = Table(title="Tracking error, rms in degrees: by hand → tuned")
+    before, after = results.hand_tuned, results.best
+    table = Table(title="Tracking error, rms in degrees: hand-tuned → tuned")
     table.add_column("joint")
     names = (TRAINING, *HELD_OUT)
     for name in names:
         table.add_column(name.replace("_", " "), justify="right")
     table.add_column("at rest [% of range]", justify="right")
-    for joint in hand["gains"]:
+    for joint in before.gains:
         cells = []
         for name in names:
-            before, after = (
-                side["trajectories"][name]["tracking_error_deg"][joint]
-                for side in (hand, best)
+            error, tuned_error = (
+                gains.trajectories[name].tracking_error_deg[joint]
+                for gains in (before, after)
             )
-            cells.append(f"{before:.2f} → {after:.2f}")
-        before, after = (
-            side["rest_oscillation_percent"][joint] for side in (hand, best)
+            cells.append(f"{error:.2f} → {tuned_error:.2f}")
+        rest, tuned_rest = (
+            gains.rest_oscillation_percent[joint] for gains in (before, after)
         )
-        table.add_row(joint, *cells, f"{before:.3f} → {after:.3f}")
+        table.add_row(joint, *cells, f"{rest:.3f} → {tuned_rest:.3f}")
     console.print(table)
-    held = results["held_out_improvement"]
+    held_out = ", ".join(
+        f"{name} {-value:+.0%}"
+        for name, value in results.held_out_improvement.items()
+    )
     console.print(
-        f"Cost {hand['cost']:.3f} → {best['cost']:.3f} "
-        f"({-results['improvement']:+.0%}); held out: "
-        + ", ".join(f"{name} {-value:+.0%}" for name, value in held.items())
+        f"Cost {before.cost:.3f} → {after.cost:.3f} "
+        f"({-results.improvement:+.0%}); held out: {held_out}"
     )

@@ -58,15 +58,25 @@ def option_name(field: dataclasses.Field) -> str:
     return "--" + field.name.replace("_", "-")
 
 
-def check_ranges(obj: Any) -> None:
-    """Raises InputError for the first field of `obj` outside its range."""
+def check_ranges(obj: Any, where: str = "") -> None:
+    """Checks the numbers of `obj` and of the dataclasses inside it.
+
+    Args:
+        obj: A dataclass with fields of `number`.
+        where: Name of `obj` in error messages, such as its file's.
+
+    Raises:
+        InputError: For the first field outside its range.
+    """
     for field in dataclasses.fields(obj):
+        value = getattr(obj, field.name)
+        name = f"{where}.{field.name}" if where else field.name
+        if dataclasses.is_dataclass(value):
+            check_ranges(value, name)
         if "range" not in field.metadata:
             continue
-        value = getattr(obj, field.name)
-        name = field.name
         if field.metadata["help"]:
             name = option_name(field)
-        for each in value if isinstance(value, tuple) else (value,):
+        for each in value if isinstance(value, (tuple, list)) else (value,):
             if each is not None:
                 require_range(name, each, *field.metadata["range"])

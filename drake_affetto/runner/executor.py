@@ -10,18 +10,8 @@ from concurrent.futures import Executor
 from typing import Any, TypeVar
 
 import numpy as np
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    Task,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
-from rich.text import Text
 
+from drake_affetto.runner.progress import make_progress
 from drake_affetto.runner.store import TrialStore, trial_key
 from drake_affetto.runner.workers import WorkerPool
 
@@ -29,16 +19,6 @@ Spec = Mapping[str, Any]
 Arrays = dict[str, np.ndarray]
 Result = tuple[dict[str, Any], Arrays]
 Key = TypeVar("Key", bound=Hashable)
-
-
-class _RateColumn(ProgressColumn):
-    """How many trials are finished in a second, or seconds each takes."""
-
-    def render(self, task: Task) -> Text:
-        speed = task.finished_speed or task.speed
-        if not speed:
-            return Text("")
-        return Text(f"{speed:.1f}/s" if speed >= 1.0 else f"{1 / speed:.1f} s")
 
 
 class TrialExecutor:
@@ -66,15 +46,7 @@ class TrialExecutor:
         self._run = run
         self._store = store
         self._pool = WorkerPool(workers, executor)
-        self._progress = Progress(
-            TextColumn("{task.description:<32}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            _RateColumn(),
-            TimeElapsedColumn(),
-            TimeRemainingColumn(),
-            disable=quiet,
-        )
+        self._progress = make_progress(quiet=quiet)
         self.reused = 0
 
     def __enter__(self) -> "TrialExecutor":

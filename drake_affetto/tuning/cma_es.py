@@ -1,4 +1,11 @@
-"""CMA-ES for each joint."""
+"""CMA-ES of each joint's gains, side by side on the same simulations.
+
+The cost of a joint depends almost only on its own four gains, which act on
+the other joints only through the body. So one small CMA-ES for each joint
+suffices, and every simulation serves all of them at once.
+
+Hansen, N.: The CMA Evolution Strategy: A Tutorial (2016), arXiv:1604.00772.
+"""
 
 from collections.abc import Mapping
 import dataclasses
@@ -8,24 +15,38 @@ import numpy as np
 from drake_affetto.common.typing import Array
 
 
+@dataclasses.dataclass(frozen=True)
+class EvaluatedCandidate:
+    """A candidate of `JointwiseCmaEs` and its costs.
+
+    Attributes:
+        x: Parameters, (joints, parameters).
+        cost: Cost of each joint, (joints,).
+    """
+
+    x: Array
+    cost: Array
+
+
 class JointwiseCmaEs:
     """CMA-ES of each joint's own parameters, all on the same evaluations.
 
     Joints are searched side by side: a candidate is one sample of every
-    joint's distribution, its evaluation gives a cost for every joint, and each
-    distribution learns from its joint's. What the joints do to each other is
-    noise to it, of which CMA-ES bears a good deal, as it goes by ranks. For 8
-    joints with 4 gains it learns 8 covariances of 4 × 4 instead of one of
-    32 × 32, which needs many times the evaluations.
+    joint's distribution. Its evaluation gives a cost for every joint, and
+    each distribution learns from the cost of its own joint. The influence of
+    the joints on each other is noise to it; CMA-ES tolerates much noise, since
+    it uses only the ranks of the costs. For 8 joints with 4 gains it learns 8
+    covariances of 4 × 4 instead of one of 32 × 32, which needs many times the
+    evaluations.
 
-    There is no state but the evaluations themselves: `ask` works out the
-    distributions from them. What candidate k is depends on the seed and the
-    generations before its own, not on who evaluates what when; a search that
-    was stopped goes on as if nothing had happened.
+    The evaluations are the only state: `ask` computes the distributions from
+    them. Candidate k depends on the seed and on the generations before its
+    own, not on the worker or the order of evaluations; so an interrupted
+    search continues exactly as an undisturbed one.
 
     Candidate 0 is the start. The first candidate of each later generation is
-    the mean of all joints' distributions: what the search would answer then,
-    and usually the best so far. Distributions do not learn from these.
+    the mean of all joints' distributions: the answer of the search at that
+    time, and usually the best so far. Distributions do not learn from these.
     """
 
     def __init__(
@@ -38,15 +59,15 @@ class JointwiseCmaEs:
         population: int,
         seed: int,
     ):
-        """Takes the search's shape.
+        """Takes the size of the search.
 
         Args:
-            joints: how many are searched.
-            parameters: of each joint.
-            sigma: first standard deviation about the start, which is 0.
-            bound: parameters lie within -bound and bound.
-            population: evaluations of a generation that are learned from.
-            seed: of the samples.
+            joints: Number of joints.
+            parameters: Number of parameters of each joint.
+            sigma: First standard deviation about the start, which is 0.
+            bound: Limit of the parameters, which lie in [-bound, bound].
+            population: Evaluations of a generation that are learned from.
+            seed: Seed of the samples.
         """
         self._shape = (joints, parameters)
         self._sigma, self.bound = sigma, bound
@@ -78,16 +99,18 @@ class JointwiseCmaEs:
         """The generation that candidate number `candidate` belongs to."""
         return candidate // self.generation_size
 
-    def ask(self, candidate: int, history: Mapping[int, "EvaluatedCandidate"]) -> Array:
+    def ask(
+        self, candidate: int, history: Mapping[int, EvaluatedCandidate]
+    ) -> Array:
         """Candidate number `candidate`, (joints, parameters).
 
         Args:
-            candidate: counts from 0.
-            history: evaluations by their candidates' numbers; those of all
-                generations before this candidate's are needed.
+            candidate: Number of the candidate, from 0.
+            history: Evaluated candidates by number; those of all generations
+                before this candidate's own are needed.
 
         Raises:
-            KeyError: where one of them is missing.
+            KeyError: If one of them is missing.
         """
         generation = self.generation(candidate)
         self._learn(generation, history)
@@ -102,27 +125,16 @@ class JointwiseCmaEs:
         return np.clip(x, -self.bound, self.bound)
 
     def _learn(
-        self, generation: int, history: Mapping[int, "EvaluatedCandidate"]
+        self, generation: int, history: Mapping[int, EvaluatedCandidate]
     ) -> None:
-        """Brings the distributions to the beginning of `generation`."""
+        """Updates the distributions to the beginning of `generation`."""
         if generation < self._learned:
             self._cmas, self._learned = self._start(), 0
         while self._learned < generation:
             first = self._learned * self.generation_size
-            told = [history[first + 1 + k] for k in range(self._population)]
+            evaluated = [
+                history[first + 1 + k] for k in range(self._population)
+            ]
             for j, cma in enumerate(self._cmas):
-                cma.tell([(item.x[j], item.cost[j]) for item in told])
+                cma.tell([(item.x[j], item.cost[j]) for item in evaluated])
             self._learned += 1
-
-
-@dataclasses.dataclass(frozen=True)
-class EvaluatedCandidate:
-    """A candidate of `JointwiseCmaEs` and what it has cost.
-
-    Attributes:
-        x: (joints, parameters).
-        cost: (joints,).
-    """
-
-    x: Array
-    cost: Array

@@ -1,54 +1,62 @@
-"""Configuration of a tuning study: its references, its cost, its search."""
+"""Configuration of a tuning study: references, cost and search.
+
+`repr(TuningConfig)` is a part of the fingerprint of stored studies: names of
+these classes and fields stay as they are.
+"""
 
 import dataclasses
 from pathlib import Path
 
-from drake_affetto.common.errors import require, require_range
-from drake_affetto.common.resources import resolve
+from drake_affetto.common.errors import require
+from drake_affetto.common.fields import check_ranges, number
 
 DEFAULT_FILE = "package://drake_affetto/tuning.yaml"
+START_FILE = "package://drake_affetto/control_hand_tuned.yaml"
 
+# Names of the references: the one that gains are tuned on, those that show
+# whether the gains suit other movements, and the one for oscillation at rest.
 TRAINING = "sines_and_steps"
-
 HELD_OUT = ("chirp", "strokes", "trapezoids")
-
 REST = "postures"
+
+_SEED = (0, 2**31 - 1)
 
 
 @dataclasses.dataclass
 class SinesConfig:
-    """Two sines for each joint, of frequencies that no two joints share.
+    """Two sines for each joint; the frequencies of all joints differ.
 
     Attributes:
-        duration: s.
-        low: lowest frequency of a joint's slow sine, Hz.
-        high: highest frequency of a joint's slow sine, Hz.
-        ratio: frequency of the fast sine over that of the slow one.
-        share: amplitude of the fast sine, of both together.
+        duration: Duration, s.
+        low: Lowest frequency of a joint's slow sine, Hz.
+        high: Highest frequency of a joint's slow sine, Hz.
+        ratio: Frequency of the fast sine divided by that of the slow one.
+        share: Amplitude of the fast sine as a part of the sum of both.
     """
 
-    duration: float = 5.0
-    low: float = 0.2
-    high: float = 0.4
-    ratio: float = 2.3
-    share: float = 0.3
+    duration: float = number(5.0, 0.5, 60.0)
+    low: float = number(0.2, 0.01, 5.0)
+    high: float = number(0.4, 0.01, 5.0)
+    ratio: float = number(2.3, 1.0, 10.0)
+    share: float = number(0.3, 0.0, 1.0)
 
 
 @dataclasses.dataclass
 class StepsConfig:
-    """Steps of all joints at once, in directions that differ.
+    """Steps of all joints at once, in different directions.
 
     Attributes:
-        levels: where the steps lead, in -1 to 1 of the excursion.
-        rise: duration of a step, s; no valve follows a sudden one.
-        hold: rest after each step, s.
+        levels: Levels after each step, from -1 to 1 of the joint's range.
+        rise: Duration of a step, s; no valve follows a sudden one.
+        hold: Rest after each step, s.
     """
 
     levels: list[float] = dataclasses.field(
-        default_factory=lambda: [0.7, -0.5, 0.3]
+        default_factory=lambda: [0.7, -0.5, 0.3],
+        metadata={"range": (-1.0, 1.0), "help": ""},
     )
-    rise: float = 0.4
-    hold: float = 1.1
+    rise: float = number(0.4, 0.05, 5.0)
+    hold: float = number(1.1, 0.05, 10.0)
 
 
 @dataclasses.dataclass
@@ -56,105 +64,108 @@ class ChirpConfig:
     """A sine of rising frequency.
 
     Attributes:
-        duration: s.
-        low: first frequency, Hz.
-        high: last frequency, Hz.
+        duration: Duration, s.
+        low: First frequency, Hz.
+        high: Last frequency, Hz.
     """
 
-    duration: float = 8.0
-    low: float = 0.1
-    high: float = 0.6
+    duration: float = number(8.0, 0.5, 60.0)
+    low: float = number(0.1, 0.01, 5.0)
+    high: float = number(0.6, 0.01, 5.0)
 
 
 @dataclasses.dataclass
 class StrokesConfig:
-    """Minimum-jerk strokes to random postures, dwell, and back: as drumming.
+    """Minimum-jerk strokes to random postures and back, as in drumming.
 
     Attributes:
-        count: how many strokes.
-        stroke: time there, s.
-        dwell: rest there, s.
-        back: time back, s.
-        pause: rest at the start posture, s.
-        seed: of the postures.
+        count: Number of strokes.
+        stroke: Duration of the movement to the posture, s.
+        dwell: Rest in the posture, s.
+        back: Duration of the movement back, s.
+        pause: Rest in the start posture, s.
+        seed: Seed of the postures.
     """
 
-    count: int = 4
-    stroke: float = 0.5
-    dwell: float = 0.4
-    back: float = 0.6
-    pause: float = 0.5
-    seed: int = 1
+    count: int = number(4, 1, 100)
+    stroke: float = number(0.5, 0.05, 5.0)
+    dwell: float = number(0.4, 0.0, 5.0)
+    back: float = number(0.6, 0.05, 5.0)
+    pause: float = number(0.5, 0.0, 5.0)
+    seed: int = number(1, *_SEED)
 
 
 @dataclasses.dataclass
 class TrapezoidsConfig:
-    """Ramps of constant rate between random levels, each joint in its time.
+    """Ramps of constant rate between random levels, at each joint's own time.
 
     Attributes:
-        count: how many ramps.
-        ramp: shortest and longest duration of a ramp, s.
-        hold: shortest and longest rest after it, s.
-        seed: of levels and times.
+        count: Number of ramps.
+        ramp: Shortest and longest duration of a ramp, s.
+        hold: Shortest and longest rest after a ramp, s.
+        seed: Seed of levels and times.
     """
 
-    count: int = 5
+    count: int = number(5, 1, 100)
     ramp: list[float] = dataclasses.field(default_factory=lambda: [0.5, 1.0])
     hold: list[float] = dataclasses.field(default_factory=lambda: [0.3, 0.8])
-    seed: int = 2
+    seed: int = number(2, *_SEED)
 
 
 @dataclasses.dataclass
 class PosturesConfig:
-    """Slow ways to random postures, where rest is looked at.
+    """Slow movements to random postures, each followed by a rest.
 
     Attributes:
-        count: how many postures.
-        move: time to each, s.
-        hold: rest there, s.
-        seed: of the postures.
+        count: Number of postures.
+        move: Duration of the movement to each, s.
+        hold: Rest in each, s.
+        seed: Seed of the postures.
     """
 
-    count: int = 4
-    move: float = 1.0
-    hold: float = 3.5
-    seed: int = 3
+    count: int = number(4, 1, 100)
+    move: float = number(1.0, 0.1, 10.0)
+    hold: float = number(3.5, 0.1, 10.0)
+    seed: int = number(3, *_SEED)
 
 
 @dataclasses.dataclass
 class CostWeights:
-    """The cost of a joint: its three parts, weighed and added.
+    """Weights of the three parts of a joint's cost.
 
     Attributes:
-        tracking: of the rms tracking error in % of the joint's range.
-        effort: of the effort in %: half the mean opening of the valves (air)
-            and half of how far they move in the time of a valve's stroke.
-        oscillation: of the rms about a slow drift at rest in % of the range.
+        tracking: Weight of the rms tracking error in % of the joint's range.
+        effort: Weight of the effort in %: half the mean opening of the valves
+            (the use of air) plus half of their movement in the duration of a
+            valve's stroke.
+        oscillation: Weight of the rms about a slow drift at rest in % of the
+            joint's range.
     """
 
-    tracking: float = 1.0
-    effort: float = 0.05
-    oscillation: float = 3.0
+    tracking: float = number(1.0, 0.0, 1e3)
+    effort: float = number(0.05, 0.0, 1e3)
+    oscillation: float = number(3.0, 0.0, 1e3)
 
 
 @dataclasses.dataclass
 class SearchConfig:
-    """How gains are searched: as factors of a start, in logarithmic scale.
+    """The search for gains, as factors of the start, in logarithmic scale.
 
     Attributes:
-        largest_factor: gains lie within start / this and start · this.
-        sigma: first standard deviation of log factors.
-        population: trials of a generation, besides that of the mean.
-        report_every: how often a trial says what it has cost so far, s.
-        prune_factor: a trial is stopped where that exceeds what the best one
-            of earlier generations had cost until then by this factor.
+        largest_factor: Bound of the factors: gains lie between the start
+            divided by this and the start times this.
+        sigma: First standard deviation of the factors' logarithms.
+        population: Trials of a generation, without that of the mean.
+        report_every: Time between two intermediate costs of a trial, s.
+        prune_factor: Ratio at which a trial is stopped: its intermediate cost
+            over the least one of earlier generations at the same time.
     """
 
-    largest_factor: float = 6.0
-    sigma: float = 0.35
-    population: int = 11
-    report_every: float = 2.5
-    prune_factor: float = 2.0
+    largest_factor: float = number(6.0, 1.01, 1e3)
+    sigma: float = number(0.35, 0.01, 3.0)
+    population: int = number(11, 4, 1000)
+    report_every: float = number(2.5, 0.1, 60.0)
+    prune_factor: float = number(2.0, 1.0, 1e3)
 
 
 @dataclasses.dataclass
@@ -162,31 +173,36 @@ class TuningConfig:
     """The references and the cost of tuning.
 
     Attributes:
-        sample_rate: of references and records, Hz.
-        margin: what a reference keeps from a joint's limits, of its range.
-        reach: of joints without an excursion: how far from its start posture
-            a joint is taken at most, of its range.
-        excursions: lowest and highest angle of joints by name, rad.
-        settling: first of a trial, until errors count, s.
-        approach: from the start posture to where sines begin, s.
-        tail: rest at the end of each reference, s.
-        rest_delay: after the reference stops a joint is given this long to
-            come to rest, s.
-        sines, steps: the test trajectory's parts.
-        chirp, strokes, trapezoids: the held-out trajectories.
-        postures: where rest is looked at.
-        cost: see `CostWeights`.
-        search: see `SearchConfig`.
+        sample_rate: Rate of references and recordings, Hz.
+        margin: Distance of a reference from a joint's limits, as a part of the
+            joint's range.
+        reach: Greatest distance from the start posture for joints without an
+            excursion, as a part of the joint's range.
+        excursions: Lowest and highest angle by joint, rad.
+        settling: Time at the beginning of a trial until errors count, s.
+        approach: Duration of the movement from the start posture to the first
+            sample of sines, s.
+        tail: Rest at the end of each reference, s.
+        rest_delay: Time that a joint has to come to rest after the reference
+            stops, s.
+        sines: First part of the training trajectory.
+        steps: Second part of the training trajectory.
+        chirp: First held-out trajectory.
+        strokes: Second held-out trajectory.
+        trapezoids: Third held-out trajectory.
+        postures: Postures in which the robot should be at rest.
+        cost: Weights of the cost.
+        search: Settings of the search.
     """
 
-    sample_rate: float = 200.0
-    margin: float = 0.05
-    reach: float = 0.2
+    sample_rate: float = number(200.0, 50.0, 1000.0)
+    margin: float = number(0.05, 0.0, 0.4)
+    reach: float = number(0.2, 0.01, 1.0)
     excursions: dict[str, list[float]] = dataclasses.field(default_factory=dict)
-    settling: float = 0.5
-    approach: float = 1.0
-    tail: float = 1.0
-    rest_delay: float = 0.5
+    settling: float = number(0.5, 0.1, 10.0)
+    approach: float = number(1.0, 0.1, 10.0)
+    tail: float = number(1.0, 0.0, 10.0)
+    rest_delay: float = number(0.5, 0.0, 10.0)
     sines: SinesConfig = dataclasses.field(default_factory=SinesConfig)
     steps: StepsConfig = dataclasses.field(default_factory=StepsConfig)
     chirp: ChirpConfig = dataclasses.field(default_factory=ChirpConfig)
@@ -200,51 +216,15 @@ class TuningConfig:
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that does not fit."""
-        for name, low, high in (
-            ("sample_rate", 50.0, 1000.0),
-            ("margin", 0.0, 0.4),
-            ("reach", 0.01, 1.0),
-            ("settling", 0.1, 10.0),
-            ("approach", 0.1, 10.0),
-            ("tail", 0.0, 10.0),
-            ("rest_delay", 0.0, 10.0),
-            ("sines.duration", 0.5, 60.0),
-            ("sines.low", 0.01, 5.0),
-            ("sines.high", self.sines.low, 5.0),
-            ("sines.ratio", 1.0, 10.0),
-            ("sines.share", 0.0, 1.0),
-            ("steps.rise", 0.05, 5.0),
-            ("steps.hold", 0.05, 10.0),
-            ("chirp.duration", 0.5, 60.0),
-            ("chirp.low", 0.01, 5.0),
-            ("chirp.high", self.chirp.low, 5.0),
-            ("strokes.count", 1, 100),
-            ("strokes.stroke", 0.05, 5.0),
-            ("strokes.dwell", 0.0, 5.0),
-            ("strokes.back", 0.05, 5.0),
-            ("strokes.pause", 0.0, 5.0),
-            ("strokes.seed", 0, 2**31 - 1),
-            ("trapezoids.count", 1, 100),
-            ("trapezoids.seed", 0, 2**31 - 1),
-            ("postures.count", 1, 100),
-            ("postures.move", 0.1, 10.0),
-            ("postures.hold", 0.1, 10.0),
-            ("postures.seed", 0, 2**31 - 1),
-            ("cost.tracking", 0.0, 1e3),
-            ("cost.effort", 0.0, 1e3),
-            ("cost.oscillation", 0.0, 1e3),
-            ("search.largest_factor", 1.01, 1e3),
-            ("search.sigma", 0.01, 3.0),
-            ("search.population", 4, 1000),
-            ("search.report_every", 0.1, 60.0),
-            ("search.prune_factor", 1.0, 1e3),
-        ):
-            value: object = self
-            for part in name.split("."):
-                value = getattr(value, part)
-            require_range(f"{where}.{name}", value, low, high)  # type: ignore[arg-type]
-        for level in self.steps.levels:
-            require_range(f"{where}.steps.levels", level, -1.0, 1.0)
+        check_ranges(self, where)
+        # Frequencies may be equal; the other pairs must differ.
+        for name, sine in (("sines", self.sines), ("chirp", self.chirp)):
+            require(
+                sine.low <= sine.high,
+                f"{where}.{name}.high",
+                sine.high,
+                f"at least {name}.low, {sine.low:g}",
+            )
         pairs = {f"excursions.{k}": v for k, v in self.excursions.items()}
         pairs["trapezoids.ramp"] = self.trapezoids.ramp
         pairs["trapezoids.hold"] = self.trapezoids.hold
@@ -261,17 +241,9 @@ def load_tuning(file: str | Path = DEFAULT_FILE) -> TuningConfig:
     """Reads a YAML file of `TuningConfig`.
 
     Raises:
-        InputError: for a file or a value that does not fit, by name.
+        InputError: If the file or a value in it does not fit.
     """
-    # Drake's YAML reader is behind this; the mathematics need none of it.
-    from drake_affetto.common.yaml_config import read_yaml, typed
+    # It imports Drake, which the command's help does not need.
+    from drake_affetto.common.yaml_config import load_config
 
-    path = resolve(file)
-    config = typed(
-        TuningConfig,
-        read_yaml(path),
-        where=path.name,
-        defaults=TuningConfig(),
-    )
-    config.check(path.stem)
-    return config
+    return load_config(TuningConfig, file)

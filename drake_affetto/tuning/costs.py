@@ -1,23 +1,24 @@
-"""What following a reference costs."""
+"""The cost of following a reference: tracking, effort, oscillation."""
 
 import dataclasses
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from drake_affetto.common.typing import Array
 from drake_affetto.tuning.config import CostWeights
-from drake_affetto.tuning.references import Array, Reference
+from drake_affetto.tuning.references import Reference
 
 
 @dataclasses.dataclass(frozen=True)
 class JointCosts:
-    """What following a reference has cost, each (n,).
+    """The costs of n joints along a reference, each (n,).
 
     Attributes:
-        tracking: rms error, % of the joint's range.
-        effort: %; see `CostWeights`.
-        oscillation: rms about a slow drift at rest, % of the joint's range.
-        total: the weighted sum.
+        tracking: Rms tracking error, % of the joint's range.
+        effort: Effort of the valves, %; see `CostWeights`.
+        oscillation: Rms about a slow drift at rest, % of the joint's range.
+        total: Weighted sum of the three.
     """
 
     tracking: Array
@@ -26,30 +27,31 @@ class JointCosts:
     total: Array
 
     def mean(self) -> float:
-        """The cost of all joints together."""
+        """The mean cost of all joints."""
         return float(np.mean(self.total))
 
 
-# Time constant of a proportional valve's stroke, in which its movement is
-# counted, s; drift slower than this is not oscillation, s.
+# Duration of a proportional valve's stroke, s. The movement of a valve is
+# counted in openings per stroke.
 _STROKE_TIME = 0.1
-
+# Movement at rest that is slower than this is drift, not oscillation, s.
 _DRIFT_TIME = 0.5
 
 
 def rest_deviation(q: ArrayLike, rest: ArrayLike, sample_rate: float) -> Array:
-    """How far joints at rest move about their mean, (n,), in units of q.
+    """The oscillation of joints at rest, (n,), in units of q.
 
-    Standard deviation within pieces of at most half a second, so that a slow
-    creep towards the goal does not count; rms over the phases.
+    It is the standard deviation within pieces of at most half a second, so
+    that a slow creep towards the goal does not count, and the rms over the
+    pieces.
 
     Args:
-        q: (T, n).
-        rest: (T,) whether the joints should be at rest.
-        sample_rate: Hz.
+        q: Joint angles, (T, n).
+        rest: Whether the joints should be at rest, (T,).
+        sample_rate: Rate of the samples, Hz.
 
     Returns:
-        Zeros where there is no phase of rest.
+        Deviations, (n,); zeros where there is no phase of rest.
     """
     q, rest = np.asarray(q, dtype=float), np.asarray(rest, dtype=bool)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], rest, [0]])))
@@ -64,20 +66,20 @@ def rest_deviation(q: ArrayLike, rest: ArrayLike, sample_rate: float) -> Array:
     return np.sqrt(total / max(count, 1))
 
 
-# What is left of a joint's rest once integrators have done their work, s.
+# The last part of a rest, in which integrators have settled, s.
 _LAST_OF_REST = 2.0
 
 
 def rest_std(q: ArrayLike, rest: ArrayLike, sample_rate: float) -> Array:
-    """Greatest standard deviation of joints at rest, (n,), in units of q.
+    """The greatest standard deviation of joints at rest, (n,), in units of q.
 
-    Of the last two seconds of each phase of rest: a limit cycle shows, a
-    creep that ends does not.
+    It is computed in the last two seconds of each phase of rest: a limit cycle
+    shows, a creep that has ended does not.
 
     Args:
-        q: (T, n).
-        rest: (T,) whether the joints should be at rest.
-        sample_rate: Hz.
+        q: Joint angles, (T, n).
+        rest: Whether the joints should be at rest, (T,).
+        sample_rate: Rate of the samples, Hz.
     """
     q, rest = np.asarray(q, dtype=float), np.asarray(rest, dtype=bool)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], rest, [0]])))
@@ -96,14 +98,15 @@ def joint_costs(
     span: ArrayLike,
     weights: CostWeights,
 ) -> JointCosts:
-    """The cost of a run along `reference`.
+    """The costs of a rollout along `reference`.
 
     Args:
-        q: (T', n) angles at the reference's times, from the first, rad; T' may
-            be less than T.
-        opening: (T', n) of the valves, in -1 to 1.
-        span: (n,) range of each joint, rad.
-        weights: of the cost's parts.
+        reference: The reference, T samples of n joints.
+        q: Angles at the reference's times, from the first, (T', n), rad; T'
+            may be less than T.
+        opening: Openings of the valves, (T', n), in -1 to 1.
+        span: Range of each joint, (n,), rad.
+        weights: Weights of the cost's parts.
     """
     q, v = np.asarray(q, dtype=float), np.asarray(opening, dtype=float)
     span = np.asarray(span, dtype=float)

@@ -1,4 +1,4 @@
-"""The robot, simulated while it follows references."""
+"""The simulated robot, which follows references with any gains."""
 
 from collections.abc import Callable
 import dataclasses
@@ -7,9 +7,7 @@ import math
 import numpy as np
 
 from drake_affetto.common.typing import Array
-from drake_affetto.control.pidf import (
-    PidfGains,
-)
+from drake_affetto.control.pidf import PidfGains
 from drake_affetto.station.scenario import Scenario, load_scenario
 from drake_affetto.tuning.config import (
     TuningConfig,
@@ -23,18 +21,39 @@ from drake_affetto.tuning.references import (
     joint_range,
     make_reference,
 )
-from drake_affetto.tuning.results import Rollout
+
+
+@dataclasses.dataclass(frozen=True)
+class Rollout:
+    """One simulation along a reference.
+
+    Attributes:
+        q: Angles at the reference's times, (T', n), rad; T' < T where the
+            simulation was stopped.
+        opening: Openings of the valves, (T', n), in -1 to 1.
+    """
+
+    q: Array
+    opening: Array
 
 
 class TrackingEnvironment:
-    """The robot, following references under any gains.
+    """The station as an environment for tracking references.
 
-    The station is built once; gains and references are its context's.
+    It is built once; each rollout sets gains and reference in its context.
+
+    Attributes:
+        tuning: Configuration of references and costs.
+        station: The AffettoStation.
+        names: Names of the n joints.
+        lower: Lower joint limits, (n,), rad.
+        upper: Upper joint limits, (n,), rad.
+        space: Range of the references.
     """
 
     def __init__(self, scenario: Scenario, tuning: TuningConfig):
-        """Builds the station with `desired_state` as its input."""
-        # Drake is loaded where it is needed: the command's help is not.
+        """Builds the station, whose input is `desired_state`."""
+        # Imported here, for the other modules import without Drake.
         from pydrake.systems.analysis import Simulator
         from pydrake.systems.framework import DiagramBuilder, TriggerType
         from pydrake.systems.primitives import (
@@ -85,26 +104,28 @@ class TrackingEnvironment:
 
     @property
     def span(self) -> Array:
-        """(n,) range of each joint, rad."""
+        """Range of each joint, (n,), rad."""
         return self.upper - self.lower
 
     def reference(self, name: str) -> Reference:
         """The reference called `name`, for this robot."""
         return make_reference(name, self.tuning, self.space)
 
-    def run(
+    def rollout(
         self,
         reference: Reference,
         gains: PidfGains,
         report: Callable[[float, Rollout], bool] | None = None,
         report_every: float = math.inf,
     ) -> Rollout:
-        """Follows `reference` from rest at the start posture.
+        """Simulates the robot along `reference`, from rest.
 
         Args:
-            report: called on the way with the time and what there is so far;
-                the run stops where it returns True.
-            report_every: s.
+            reference: Reference to follow.
+            gains: Gains of the n joints.
+            report: Function of the time and the rollout so far, called while
+                the simulation runs, which stops it by returning True.
+            report_every: Time between two calls of `report`, s.
         """
         station, context = self.station, self._context
         desired = np.hstack([reference.q, reference.rate()]).T
@@ -112,19 +133,21 @@ class TrackingEnvironment:
             self._polynomial.FirstOrderHold(reference.t, desired)
         )
         context.SetTime(0.0)
-        mine = station.GetMyMutableContextFromRoot(context)
-        station.reset(mine)
-        # Where no reference leads the hand.
+        station_context = station.GetMyMutableContextFromRoot(context)
+        station.reset(station_context)
+        # The drum stands where no reference moves the hand.
         region = station.scenario.drum_region
-        station.set_drum_position(mine, [region.x[1], region.y[1]])
+        station.set_drum_position(station_context, [region.x[1], region.y[1]])
+        # Equilibrium: the integrators hold the start posture.
         controller = station.GetMutableSubsystemContext(
-            station.controller, mine
+            station.controller, station_context
         )
         held = station.controller.get_pid_output_output_port().Eval(controller)
         station.controller.set_gains(controller, gains)
         station.controller.set_integral(controller, held)
         for log in self._logs:
             log.FindMutableLog(context).Clear()
+        # Advance, with a report from time to time.
         self._simulator.Initialize()
         time = 0.0
         while time < reference.duration:
@@ -133,12 +156,12 @@ class TrackingEnvironment:
             if (
                 report is not None
                 and time < reference.duration
-                and report(time, self._recorded(reference))
+                and report(time, self._recording(reference))
             ):
                 break
-        return self._recorded(reference)
+        return self._recording(reference)
 
-    def _recorded(self, reference: Reference) -> Rollout:
+    def _recording(self, reference: Reference) -> Rollout:
         state, opening = (self._read(log) for log in self._logs)
         count = min(len(state), len(opening), len(reference.t))
         return Rollout(state[:count, : len(self.names)], opening[:count])
@@ -146,23 +169,23 @@ class TrackingEnvironment:
     def _read(self, log) -> Array:
         data = log.FindLog(self._context)
         t = data.sample_times()
-        # A time at which the simulator stopped is logged twice.
+        # Times at which the simulator stopped are logged twice.
         keep = np.append(np.diff(t) > 1e-9, True)
         return data.data().T[keep].copy()
 
-    def costs(self, reference: Reference, run: Rollout) -> JointCosts:
-        """What `run` along `reference` has cost."""
+    def costs(self, reference: Reference, rollout: Rollout) -> JointCosts:
+        """The costs of a rollout along `reference`."""
         return joint_costs(
-            reference, run.q, run.opening, self.span, self.tuning.cost
+            reference, rollout.q, rollout.opening, self.span, self.tuning.cost
         )
 
 
-# One bench for each process and plan.
+# The environments of this process, by scenario and tuning file.
 _ENVIRONMENTS: dict[tuple[str, str], TrackingEnvironment] = {}
 
 
 def environment(plan: TunePlan) -> TrackingEnvironment:
-    """This process's bench, built when first asked for."""
+    """This process's environment of a plan, built at the first call."""
     key = (plan.scenario, plan.tuning)
     if key not in _ENVIRONMENTS:
         _ENVIRONMENTS[key] = TrackingEnvironment(
@@ -172,20 +195,12 @@ def environment(plan: TunePlan) -> TrackingEnvironment:
 
 
 def run_reference(plan: TunePlan, name: str, gains: Array) -> Rollout:
-    """Follows the reference `name` with `gains` (4, n), in this process."""
-    robot = environment(plan)
-    return robot.run(robot.reference(name), PidfGains.from_array(gains))
+    """Simulates one reference in this process.
 
-
-@dataclasses.dataclass(frozen=True)
-class Rollout:
-    """One run along a reference.
-
-    Attributes:
-        q: (T', n) angles at the reference's times, rad; T' < T where the run
-            was stopped.
-        opening: (T', n) of the valves.
+    Args:
+        plan: Plan of the study.
+        name: Name of the reference.
+        gains: Gains kP, kI, kD and kF of the n joints, (4, n).
     """
-
-    q: Array
-    opening: Array
+    robot = environment(plan)
+    return robot.rollout(robot.reference(name), PidfGains.from_array(gains))

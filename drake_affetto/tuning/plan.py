@@ -1,4 +1,4 @@
-"""TODO."""
+"""The plan of a tuning study."""
 
 from collections.abc import Sequence
 import dataclasses
@@ -10,22 +10,22 @@ from drake_affetto.control.pidf import (
 from drake_affetto.station.scenario import load_scenario
 from drake_affetto.tuning.config import (
     DEFAULT_FILE,
+    START_FILE,
     load_tuning,
 )
-
-START_FILE = "package://drake_affetto/control_hand_tuned.yaml"
 
 GAINS = ("kP", "kI", "kD", "kF")
 
 
 @dataclasses.dataclass(frozen=True)
 class TunePlan:
-    """What determines a tuning study, but for how many trials it has.
+    """All that determines a tuning study, except its number of trials.
 
     Attributes:
-        joints: whose gains are searched; the others keep those of `start`.
-        seed: of the search.
-        scenario: name or file of the scenario.
+        joints: Joints whose gains are searched; the others keep those of
+            `start`.
+        seed: Seed of the search.
+        scenario: Name or file of the scenario.
         start: YAML file of the gains that the search starts from.
         tuning: YAML file of `TuningConfig`.
     """
@@ -38,7 +38,7 @@ class TunePlan:
 
 
 def parameter_names(joints: Sequence[str]) -> list[str]:
-    """Names of a study's parameters: joint by joint, its gains' factors."""
+    """Names of the search's parameters, joint by joint: the gains' factors."""
     return [f"{joint}.{gain}" for joint in joints for gain in GAINS]
 
 
@@ -50,13 +50,17 @@ def load_plan(
     start: str = START_FILE,
     tuning: str = DEFAULT_FILE,
 ) -> TunePlan:
-    """A plan, checked before anything runs.
+    """Makes a plan and checks it before anything runs.
 
     Args:
-        joints: active joints of the scenario; None for all of them.
+        joints: Active joints of the scenario; None for all of them.
+        seed: Seed of the search.
+        scenario: Name or file of the scenario.
+        start: YAML file of the gains that the search starts from.
+        tuning: YAML file of `TuningConfig`.
 
     Raises:
-        InputError: where joints, files or their values do not fit.
+        InputError: If joints, files or their values do not fit.
     """
     loaded = load_scenario(scenario)
     require(

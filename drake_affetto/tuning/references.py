@@ -1,12 +1,9 @@
-"""What gains are tuned on: references, what following them costs, a search.
+"""The reference trajectories that gains are tuned and evaluated on.
 
-A reference is a movement of n joints about the start posture. The test
-trajectory (sines, then steps) is what gains are tuned on; three of other kinds
-(chirps, strokes, trapezoids) are held out, to see whether the gains hold.
-
-The cost of a joint is nearly its own affair: its four gains act on the other
-joints only through the body. `JointwiseCmaEs` makes use of that. It runs one
-small CMA-ES for each joint, and every simulation serves all of them at once.
+A reference is a movement of n joints about the start posture. Gains are tuned
+on the training trajectory (sines, then steps). Three trajectories of other
+kinds (chirps, strokes, trapezoids) are held out: they show whether the gains
+suit other movements too.
 """
 
 from collections.abc import Sequence
@@ -22,15 +19,15 @@ from drake_affetto.tuning.config import REST, TRAINING, TuningConfig
 
 @dataclasses.dataclass(frozen=True)
 class Reference:
-    """A movement to be followed.
+    """A movement of n joints to be followed.
 
     Attributes:
-        name: which.
-        t: (T,) s, evenly from 0.
-        q: (T, n) rad.
-        rest: (T,) whether all joints should be at rest, the time that they
-            are given to come to rest being over.
-        counted: (T,) whether errors count.
+        name: Name of the reference.
+        t: Times, evenly from 0, (T,), s.
+        q: Joint angles, (T, n), rad.
+        rest: Whether all joints should be at rest, after the time that they
+            have to come to rest, (T,).
+        counted: Whether errors count, (T,).
     """
 
     name: str
@@ -41,24 +38,30 @@ class Reference:
 
     @property
     def duration(self) -> float:
-        """s."""
+        """Duration of the reference, s."""
         return float(self.t[-1])
 
     def rate(self) -> Array:
-        """(T, n) rad/s."""
+        """Joint velocities, (T, n), rad/s."""
         return np.gradient(self.q, self.t, axis=0)
 
 
 @dataclasses.dataclass(frozen=True)
 class JointRange:
-    """Where references may take n joints, all (n,), rad."""
+    """The range of angles in which references move n joints.
+
+    Attributes:
+        start: Start posture, (n,), rad.
+        low: Lowest angles, (n,), rad.
+        high: Highest angles, (n,), rad.
+    """
 
     start: Array
     low: Array
     high: Array
 
     def angle(self, level: Array) -> Array:
-        """The angle at a level in -1 (low) to 1 (high)."""
+        """The angle at a level from -1 (low) to 1 (high)."""
         return self.low + 0.5 * (level + 1.0) * (self.high - self.low)
 
     def level(self, angle: Array) -> Array:
@@ -73,16 +76,18 @@ def joint_range(
     lower: ArrayLike,
     upper: ArrayLike,
 ) -> JointRange:
-    """Where references take the joints `names`.
+    """The range in which references move the joints `names`.
 
     Args:
-        start: (n,) start posture, rad.
-        lower: (n,) limits, rad.
-        upper: (n,) limits, rad.
+        config: Configuration of the tuning.
+        names: Names of the n joints.
+        start: Start posture, (n,), rad.
+        lower: Lower joint limits, (n,), rad.
+        upper: Upper joint limits, (n,), rad.
 
     Raises:
-        InputError: where an excursion leaves the limits less their margin, or
-            the joint's start posture is not within it.
+        InputError: If an excursion leaves the joint's limits, or the joint's
+            start posture is not within it.
     """
     q, a, b = (np.array(x, dtype=float) for x in (start, lower, upper))
     room = config.margin * (b - a)
@@ -104,7 +109,7 @@ def joint_range(
 
 
 def minimum_jerk(s: Array) -> Array:
-    """The minimum-jerk way from 0 to 1 as s goes from 0 to 1, else held."""
+    """The minimum-jerk blend from 0 to 1 for s in [0, 1], constant outside."""
     s = np.clip(s, 0.0, 1.0)
     return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
@@ -114,10 +119,10 @@ def make_reference(
 ) -> Reference:
     """The reference called `name`: `TRAINING`, `REST` or one of `HELD_OUT`.
 
-    All begin at rest at the start posture and end at rest.
+    All begin at rest in the start posture and end at rest.
 
     Raises:
-        InputError: for another name.
+        InputError: If there is no reference of that name.
     """
     kinds = {
         TRAINING: _sines_and_steps,
@@ -131,7 +136,7 @@ def make_reference(
 
 
 def _finish(name: str, config: TuningConfig, q: Array) -> Reference:
-    """Adds times, and finds where all joints should be at rest."""
+    """Adds the times and the phases in which all joints should be at rest."""
     dt = 1.0 / config.sample_rate
     t = np.arange(len(q), dtype=np.float64) * dt
     counted = t >= config.settling - 1e-9
@@ -145,7 +150,7 @@ def _finish(name: str, config: TuningConfig, q: Array) -> Reference:
 
 
 def _samples(config: TuningConfig, duration: float) -> Array:
-    """Times of the samples of a part, without its beginning, s."""
+    """Sample times of a part, without its first instant, s."""
     count = round(duration * config.sample_rate)
     return np.arange(1, count + 1) / config.sample_rate
 
@@ -158,6 +163,7 @@ def _move(
 
 
 def _hold(config: TuningConfig, at: Array, duration: float) -> Array:
+    """Samples of a rest, (T, n)."""
     return np.repeat(at[None], len(_samples(config, duration)), axis=0)
 
 
@@ -167,7 +173,7 @@ def _directions(n: int) -> Array:
 
 
 def _fade(t: Array, duration: float, ramp: float) -> Array:
-    """Rises from 0 to 1 and falls again, smoothly, (T, 1)."""
+    """A window that rises smoothly from 0 to 1 and falls again, (T, 1)."""
     rising = minimum_jerk(t / ramp)
     return (rising * minimum_jerk((duration - t) / ramp))[:, None]
 
@@ -176,7 +182,7 @@ def _sines_and_steps(config: TuningConfig, space: JointRange) -> Reference:
     n = space.start.size
     sines, steps = config.sines, config.steps
     middle = space.angle(np.zeros(n))
-    # About the middle of the excursion, where there is room for both sides.
+    # About the middle of the range, where there is room to both sides.
     parts = [
         space.start[None],
         _hold(config, space.start, config.settling),
@@ -184,7 +190,7 @@ def _sines_and_steps(config: TuningConfig, space: JointRange) -> Reference:
     ]
     t = _samples(config, sines.duration)
     slow = np.linspace(sines.low, sines.high, n)
-    # Neighbours in the body should not be neighbours in frequency.
+    # Neighboring joints should not have neighboring frequencies.
     slow = slow[np.argsort(np.arange(n) * 0.618 % 1.0)]
     phase = 2.0 * np.pi * t[:, None] * slow
     wave = (1.0 - sines.share) * np.sin(phase)
@@ -209,7 +215,8 @@ def _chirp(config: TuningConfig, space: JointRange) -> Reference:
     middle = space.angle(np.zeros(n))
     t = _samples(config, chirp.duration)
     slope = (chirp.high - chirp.low) / chirp.duration
-    # The joints start one after another round the circle, faded in and out.
+    # Phases of the joints are spread over the circle; the sine is faded in
+    # and out.
     shift = 2.0 * np.pi * (np.arange(n) * 0.618 % 1.0)
     phase = 2.0 * np.pi * (chirp.low * t + 0.5 * slope * t**2)
     wave = 0.9 * np.sin(phase[:, None] + shift)
@@ -232,7 +239,7 @@ def _strokes(config: TuningConfig, space: JointRange) -> Reference:
     start = space.start
     parts = [start[None], _hold(config, start, config.settling)]
     for _ in range(strokes.count):
-        # A stroke takes every joint some way along its excursion.
+        # A stroke moves each joint by a part of its range.
         to = start + rng.uniform(0.2, 0.8, n) * (
             np.where(rng.random(n) < 0.5, space.low, space.high) - start
         )

@@ -1,4 +1,4 @@
-"""The search as an Optuna study."""
+"""The search as an Optuna study: sampler, pruner and storage."""
 
 from collections.abc import Mapping, Sequence
 import math
@@ -30,21 +30,27 @@ _STUDY_NAME = "tune"
 class JointwiseSampler(optuna.samplers.BaseSampler):
     """`JointwiseCmaEs` as the sampler of an Optuna study.
 
-    Which candidate of the search a trial is, `candidate` says; it is set
-    before the study is asked, and kept in the trial's user attributes. A
-    trial that a kill has ended is not its candidate's last: another one does
-    its work.
+    Each trial evaluates one candidate of the search. A candidate whose trial
+    was interrupted is evaluated again by another trial, so that numbers of
+    trials and of candidates differ then.
+
+    Attributes:
+        joints: Joints whose gains are searched.
+        search: The search.
+        space: Distributions by parameter name.
+        candidate: Number of the next trial's candidate. It is set before
+            `study.ask`, and stored in the trial's user attributes.
     """
 
     def __init__(self, joints: Sequence[str], search: JointwiseCmaEs):
-        """Takes the joints, in the order of the search."""
+        """Takes the search and its joints, in the order of the search."""
         self.joints = tuple(joints)
         self.search = search
         self.space = search_space(joints, search.bound)
         self.candidate = 0
 
     def infer_relative_search_space(self, study, trial):
-        """All gains' factors together."""
+        """All factors are sampled together."""
         return dict(self.space)
 
     def sample_relative(self, study, trial, search_space):
@@ -57,14 +63,14 @@ class JointwiseSampler(optuna.samplers.BaseSampler):
         return factors
 
     def sample_independent(self, study, trial, name, distribution):
-        """Never needed: all parameters are sampled together."""
+        """Never called: all factors are sampled together."""
         raise RuntimeError(f"{name} is no gain of this study")
 
 
 def search_space(
     joints: Sequence[str], bound: float
 ) -> dict[str, optuna.distributions.FloatDistribution]:
-    """The factors of all gains, with logarithms from -bound to bound."""
+    """The range of each gain's factor: its logarithm is in [-bound, bound]."""
     return {
         name: optuna.distributions.FloatDistribution(
             math.exp(-bound), math.exp(bound), log=True
@@ -74,7 +80,7 @@ def search_space(
 
 
 def finished_trials(study: optuna.Study) -> dict[int, FrozenTrial]:
-    """The study's finished trials, pruned ones too, by their candidate."""
+    """The study's finished trials, also the pruned ones, by candidate."""
     found: dict[int, FrozenTrial] = {}
     for trial in study.get_trials(
         deepcopy=False, states=(TrialState.COMPLETE, TrialState.PRUNED)
@@ -86,7 +92,7 @@ def finished_trials(study: optuna.Study) -> dict[int, FrozenTrial]:
 def history_of(
     study: optuna.Study, joints: Sequence[str]
 ) -> dict[int, EvaluatedCandidate]:
-    """The study's finished trials as the search sees them."""
+    """The finished trials in the form that the search needs."""
     names = parameter_names(joints)
     shape = (len(joints), len(GAINS))
     return {
@@ -101,10 +107,10 @@ def history_of(
 def comparable_trials(
     study: optuna.Study, search: JointwiseCmaEs, candidate: int
 ) -> list[FrozenTrial]:
-    """Complete trials that a candidate may be compared with.
+    """The complete trials that a candidate is compared with.
 
-    The start, and all of earlier generations: whatever the order in which
-    workers finish, these are there.
+    They are the start and all of earlier generations, which have finished in
+    whatever order workers finish.
     """
     first = search.generation(candidate) * search.generation_size
     return [
@@ -116,15 +122,15 @@ def comparable_trials(
 
 
 class FarFromBestPruner(optuna.pruners.BasePruner):
-    """Stops a trial that is far worse than the best was at the same time."""
+    """Stops a trial that costs much more than the best did by that time."""
 
     def __init__(self, factor: float, search: JointwiseCmaEs):
-        """Takes how many times the best trial's cost is too much."""
+        """Takes the ratio of costs at which a trial is stopped."""
         self._factor = factor
         self._search = search
 
     def prune(self, study, trial) -> bool:
-        """Whether `trial` is to be stopped after its last report."""
+        """Whether to stop `trial` after its last report."""
         step = trial.last_step
         known = [
             other.intermediate_values[step]
@@ -142,11 +148,12 @@ def scaled_gains(
     names: Sequence[str],
     factors: Mapping[str, float],
 ) -> PidfGains:
-    """The gains of a trial: those of the start times the trial's factors.
+    """The gains of a trial: the start times the trial's factors.
 
     Args:
-        start: of the joints `names`.
-        factors: by the names of `parameter_names`.
+        start: Gains of the n joints.
+        names: Names of the n joints.
+        factors: Factors by the names of `parameter_names`.
     """
     array = start.to_array()
     for key, factor in factors.items():
@@ -158,7 +165,7 @@ def scaled_gains(
 def open_study(
     out: Path, plan: TunePlan
 ) -> tuple[optuna.Study, JointwiseSampler]:
-    """The study in the folder `out`, made where there is none."""
+    """Opens the study in the folder `out`, or makes a new one."""
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     storage = optuna.storages.RDBStorage(
         f"sqlite:///{(out / STUDY_FILE).resolve().as_posix()}",

@@ -19,6 +19,7 @@ from drake_affetto import __version__
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.folder_lock import lock_folder
 from drake_affetto.common.output import write_json, write_text_atomic
+from drake_affetto.common.typed_json import to_plain
 from drake_affetto.control.pidf import load_control
 from drake_affetto.pneumatics.parameters import load_parameters
 from drake_affetto.runner.workers import WorkerPool
@@ -26,6 +27,7 @@ from drake_affetto.tuning.cma_es import JointwiseCmaEs
 from drake_affetto.tuning.environment import environment
 from drake_affetto.tuning.plan import TunePlan
 from drake_affetto.tuning.results import (
+    TuningResults,
     evaluate,
     make_results,
     overlay_text,
@@ -154,14 +156,20 @@ def _run_trials(
     bounds = {0, min(1, trials), *range(size, trials, size), trials}
     with progress:
         for first, end in itertools.pairwise(sorted(bounds)):
+            generation = range(first, end)
+
+            def remaining(
+                generation: range = generation,
+            ) -> dict[int, tuple[str, TunePlan, int]]:
+                return {
+                    candidate: (str(out), plan, candidate)
+                    for candidate in generation
+                    if candidate not in finished
+                }
+
             pool.run(
                 run_trial,
-                # The defaults bind this generation's numbers.
-                lambda first=first, end=end: {
-                    candidate: (str(out), plan, candidate)
-                    for candidate in range(first, end)
-                    if candidate not in finished
-                },
+                remaining,
                 keep,
                 label="Tuning",
                 on_death=on_death,
@@ -187,7 +195,7 @@ def run_tune(
     restart: bool = False,
     page: bool = True,
     console: Any = None,
-) -> dict[str, Any]:
+) -> TuningResults:
     """Runs the study in the folder `out` until it has `trials` trials.
 
     Args:
@@ -200,16 +208,14 @@ def run_tune(
         console: A rich console for progress; None for silence.
 
     Returns:
-        The content of results.json.
+        The results, as results.json holds them.
 
     Raises:
         InputError: If the folder holds another study, or another process
             works in it.
     """
     with lock_folder(out, "affetto tune"), WorkerPool(workers) as pool:
-        study = _run_trials(
-            out, plan, trials, pool, workers, restart, console
-        )
+        study = _run_trials(out, plan, trials, pool, workers, restart, console)
         # Start and best gains follow all references, the held-out ones too.
         if console is not None:
             console.print("Following the held-out trajectories ...")
@@ -221,9 +227,9 @@ def run_tune(
         results = make_results(plan, study, best, gains, evaluation)
         heading = (
             f"Gains from `affetto tune`: trial {best.number} of "
-            f"{results['trials']['finished']}, seed {plan.seed}.\n"
-            f"Cost on the test trajectory {results['best']['cost']:.3f}; of "
-            f"the hand-tuned gains {results['hand_tuned']['cost']:.3f}.\n"
+            f"{results.trials.finished}, seed {plan.seed}.\n"
+            f"Cost on the test trajectory {results.best.cost:.3f}; of "
+            f"the hand-tuned gains {results.hand_tuned.cost:.3f}.\n"
             "A scenario takes them up with: control: {overlays: [THIS FILE]}"
         )
         write_text_atomic(
@@ -235,7 +241,13 @@ def run_tune(
 
             if console is not None:
                 console.print("Writing the study's page ...")
-            write_page(out / "study.html", plan, study, results, evaluation)
+            write_page(
+                out / "study.html",
+                plan,
+                study,
+                to_plain(results),
+                evaluation,
+            )
         # Last: where results.json is, all the rest is.
         write_json(out / "results.json", results)
     return results

@@ -1,4 +1,4 @@
-"""One trial of a tuning study"""
+"""One trial of a tuning study, as a worker runs it."""
 
 from pathlib import Path
 
@@ -22,61 +22,63 @@ from drake_affetto.tuning.search import (
     open_study,
     scaled_gains,
 )
-from drake_affetto.tuning.study import _die_with_parent
 
-_watched = False
+# The studies that this process has opened, by folder and plan.
+_STUDIES: dict[tuple[str, TunePlan], tuple[optuna.Study, JointwiseSampler]] = {}
 
 
 def run_trial(out: str, plan: TunePlan, candidate: int) -> int:
     """Runs one candidate as a trial of the study in the folder `out`.
 
     Args:
-        candidate: its number; all earlier generations have finished.
+        out: Folder of the study.
+        plan: Plan of the study.
+        candidate: Number of the candidate; all earlier generations have
+            finished.
 
     Returns:
         The candidate's number.
     """
-    global _watched
-    if not _watched:
-        _die_with_parent()
-        _watched = True
     robot = environment(plan)
     key = (out, plan)
     if key not in _STUDIES:
         _STUDIES[key] = open_study(Path(out), plan)
     study, sampler = _STUDIES[key]
+    # The sampler gives the candidate's factors of the start's gains.
     sampler.candidate = candidate
     trial = study.ask({**sampler.space})
     trial.set_user_attr("candidate", candidate)
     reference = robot.reference(TRAINING)
     start = load_control(plan.start).for_joints(robot.names)
     where = [robot.names.index(joint) for joint in plan.joints]
+    # Follow the training trajectory, unless the pruner stops it.
     so_far: list[list[float]] = []
 
-    def report(_: float, run: Rollout) -> bool:
-        costs = robot.costs(reference, run)
+    def report(_: float, rollout: Rollout) -> bool:
+        costs = robot.costs(reference, rollout)
         so_far.append(costs.total[where].tolist())
         trial.report(costs.mean(), len(so_far))
         return trial.should_prune()
 
-    run = robot.run(
+    rollout = robot.rollout(
         reference,
         scaled_gains(start, robot.names, trial.params),
         report,
         robot.tuning.search.report_every,
     )
-    pruned = len(run.q) < len(reference.t)
-    costs = robot.costs(reference, run)
+    pruned = len(rollout.q) < len(reference.t)
+    costs = robot.costs(reference, rollout)
     by_joint = costs.total[where]
     if pruned:
-        # A part of the trajectory costs more or less than the whole: as much
-        # more as it did for the trials that went all the way.
+        # Estimates the cost of the whole trajectory from that of its first
+        # part, by the ratio that complete trials had.
         ratio = [
             np.array(list(other.user_attrs["joint_costs"].values()))
             / np.array(other.user_attrs["so_far"][len(so_far) - 1])
             for other in comparable_trials(study, sampler.search, candidate)
         ]
         by_joint = by_joint * np.median(ratio, axis=0)
+    # Keep the costs, which the search learns from.
     trial.set_user_attr("so_far", so_far)
     trial.set_user_attr(
         "joint_costs", dict(zip(plan.joints, by_joint.tolist(), strict=True))
@@ -86,6 +88,3 @@ def run_trial(out: str, plan: TunePlan, candidate: int) -> int:
     else:
         study.tell(trial, costs.mean())
     return candidate
-
-
-_STUDIES: dict[tuple[str, TunePlan], tuple[optuna.Study, JointwiseSampler]] = {}
