@@ -378,7 +378,7 @@ class SchemeCell:
     rewards: list[float] = field(default_factory=list)
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class SchemeComparisonRow:
     """The paired test of two schemes.
 
@@ -398,7 +398,7 @@ class SchemeComparisonRow:
     difference: float
     p: float | None = None
     effect_size: float | None = None
-    p_corrected: float | None = None
+    p_corrected: float | None
 
 
 @dataclasses.dataclass(frozen=True)

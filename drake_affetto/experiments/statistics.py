@@ -135,6 +135,7 @@ def compare(
                 difference=float(first.mean() - second.mean()),
                 p=paired_p(first.sum(axis=1), second.sum(axis=1)),
                 effect_size=cohens_h(first.mean(), second.mean()),
+                p_corrected=None,
             )
         )
     corrected = holm([row.p for row in rows if row.p is not None])

@@ -26,12 +26,12 @@ def write_report(folders: Sequence[Path], path: Path) -> Path:
             on the page, two are of one kind, a file is damaged or of another
             version, or the page cannot be written.
     """
-    from drake_affetto.report.data import read_sources
     from drake_affetto.report.page import make_page
+    from drake_affetto.report.study_folder import read_folders
 
     path = Path(path).expanduser()
     require(not path.is_dir(), "--out", str(path), "a file, not a folder")
-    page = make_page(read_sources(folders))
+    page = make_page(read_folders(folders))
     prepare_output(path.parent)
     write_text_atomic(path, page)
     return path

@@ -148,6 +148,7 @@ def drum(seed=0, repeats=3, evaluations=10, active=True):
     hits = [row for row in rewards if row["impulse"] > 0.05]
     return {
         **head("drum", seed),
+        "scenario": "drumming",
         "demonstrations": 25,
         "evaluations": evaluations,
         "repeats": repeats,
@@ -184,7 +185,7 @@ def drum(seed=0, repeats=3, evaluations=10, active=True):
     }
 
 
-def _mirror_body(rates, seed, samples, repeats, evaluations):
+def _mirror_body(scenario, rates, seed, samples, repeats, evaluations):
     rng = np.random.default_rng([seed, 5])
     schemes = {}
     for name, share in rates.items():
@@ -232,10 +233,15 @@ def _mirror_body(rates, seed, samples, repeats, evaluations):
         return np.stack([0.9 - 0.7 * y + 0.1 * x * y, 0.4 - 0.8 * x], axis=1)
 
     return {
+        **head("mirror", seed),
+        "scenario": scenario,
         "samples": list(samples),
         "repeats": repeats,
         "evaluations": evaluations,
         "demonstrations": 25,
+        "choice": "random",
+        "variability": 1.0,
+        "workspace": 1.0,
         "schemes": schemes,
         "comparisons": comparisons,
         "map": {
@@ -255,11 +261,9 @@ def _mirror_body(rates, seed, samples, repeats, evaluations):
 def mirror(
     winner="transfer", seed=0, samples=(3, 4, 5), repeats=10, evaluations=6
 ):
-    return {
-        **head("mirror", seed),
-        "scenario": "mirror",
-        **_mirror_body(WINNERS[winner], seed, samples, repeats, evaluations),
-    }
+    return _mirror_body(
+        "mirror", WINNERS[winner], seed, samples, repeats, evaluations
+    )
 
 
 def scenarios(seed=0):
@@ -273,7 +277,7 @@ def scenarios(seed=0):
     return {
         **head("scenarios", seed),
         "scenarios": {
-            name: _mirror_body(WINNERS[winner], seed + i, (3, 5), 5, 6)
+            name: _mirror_body(name, WINNERS[winner], seed + i, (3, 5), 5, 6)
             for i, (name, winner) in enumerate(wins.items())
         },
     }
@@ -307,7 +311,13 @@ def conditions(seed=0):
                             "per_repeat": per_repeat.tolist(),
                         }
                     )
-    return {**head("conditions", seed), "conditions": rows}
+    return {
+        **head("conditions", seed),
+        "scenario": "mirror",
+        "repeats": 5,
+        "evaluations": 6,
+        "conditions": rows,
+    }
 
 
 def toy(seed=0, seeds=6):
@@ -350,8 +360,7 @@ def toy(seed=0, seeds=6):
         }
 
     return {
-        "version": __version__,
-        "seed": seed,
+        **head("toy", seed),
         "seeds": seeds,
         "repeats": 100,
         "function": "2 x1^3 + 4 x2 + 2 exp(x1 x2), half a turn",
@@ -397,8 +406,7 @@ def demo(seed=0):
         "transfer_default": 5,
     }
     return {
-        "version": __version__,
-        "seed": seed,
+        **head("demo", seed),
         "drumming": {
             "demonstrations": 12,
             "taught": _taught(rng, 12),
@@ -421,7 +429,7 @@ def demo(seed=0):
 
 
 def png(width=32, height=24, color=(90, 140, 190)):
-    """A picture of one colour."""
+    """A picture of one color."""
 
     def chunk(kind, data):
         body = kind + data
@@ -446,7 +454,7 @@ fetch("data:text/plain,x").then(() => parent.postMessage("replay runs", "*"));
 """
 
 
-def write_exhibits(folder: Path):
+def write_media(folder: Path):
     """Pictures, sounds and a replay that tells the page it runs."""
     for name in ("camera_direct", "camera_mirror", "trial"):
         (folder / f"{name}.png").write_bytes(png())
@@ -459,19 +467,19 @@ def write_exhibits(folder: Path):
     (folder / "replay.html").write_text(REPLAY)
 
 
-def write(folder: Path, results, exhibits=False) -> Path:
+def write(folder: Path, results, media=False) -> Path:
     """Makes a study's folder."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "results.json").write_text(json.dumps(results))
-    if exhibits:
-        write_exhibits(folder)
+    if media:
+        write_media(folder)
     return folder
 
 
 def write_all(parent: Path) -> list[Path]:
     """A folder of each study."""
     return [
-        write(parent / "demo", demo(), exhibits=True),
+        write(parent / "demo", demo(), media=True),
         write(parent / "drum", drum()),
         write(parent / "mirror", mirror("level")),
         write(parent / "scenarios", scenarios()),

@@ -1,14 +1,14 @@
-"""What the page says of the numbers: names, figures in words, verdicts.
+"""What the page says of the numbers: names, figures in words, conclusions.
 
-Every statement of who is better is computed here from a `Contest`; nothing is
-assumed to come out as in the paper.
+Every statement about which scheme is better is computed here from a
+`SchemeComparison`; nothing is assumed to come out as in the paper.
 """
 
 from collections.abc import Iterable
 import dataclasses
-from typing import Any
 
-from drake_affetto.report.data import Comparison, Contest, Rate
+from drake_affetto.experiments.results import SuccessRate, ToyResults
+from drake_affetto.report.comparison import Comparison, SchemeComparison
 
 # By scheme: what it is called, shortly and in full, and what it does.
 SCHEMES: dict[str, tuple[str, str, str]] = {
@@ -70,7 +70,7 @@ PAPER_ORDER = (
 # With a space that no line ends at.
 _UNIT = "\N{NO-BREAK SPACE}%"
 
-# Rates nearer than this are called equal.
+# SuccessRates nearer than this are called equal.
 _EQUAL = 0.005
 
 
@@ -126,12 +126,12 @@ def percent(share: float) -> str:
     return f"{text}{_UNIT}"
 
 
-def rate(value: Rate) -> str:
+def rate(value: SuccessRate) -> str:
     """As "98 % (95 to 100)"."""
     return f"{percent(value.mean)} ({interval(value)})"
 
 
-def interval(value: Rate) -> str:
+def interval(value: SuccessRate) -> str:
     """As "95 to 100"."""
     low, high = (
         percent(v).removesuffix(_UNIT) for v in (value.low, value.high)
@@ -162,7 +162,7 @@ def sentence(text: str) -> str:
 
 
 @dataclasses.dataclass(frozen=True)
-class Verdict:
+class Conclusion:
     """How the schemes stand with one number of samples.
 
     Attributes:
@@ -189,9 +189,9 @@ class Verdict:
     text: str
 
 
-def judge(contest: Contest, samples: int) -> Verdict:
+def conclude(comparison: SchemeComparison, samples: int) -> Conclusion:
     """Who wins with `samples` demonstrations, computed and worded."""
-    rates = {name: row[samples] for name, row in contest.rates.items()}
+    rates = {name: row[samples] for name, row in comparison.rates.items()}
     best = max(r.mean for r in rates.values())
     leaders = [n for n in ordered(rates) if best - rates[n].mean < _EQUAL]
     level = [
@@ -199,7 +199,8 @@ def judge(contest: Contest, samples: int) -> Verdict:
         for name in ordered(rates)
         if name not in leaders
         and all(
-            (compared := contest.compare(leader, name, samples)).p is not None
+            (compared := comparison.compare(leader, name, samples)).p
+            is not None
             and not compared.clear
             for leader in leaders
         )
@@ -212,15 +213,15 @@ def judge(contest: Contest, samples: int) -> Verdict:
         parts.append(f"not significantly behind: {named}")
     winner = _winner(leaders, level)
     if set(leaders) - set(TRANSFERS):
-        parts.append(_beaten(contest, samples, rates, leaders))
-    order, order_text = _paper_order(contest, samples, rates)
+        parts.append(_beaten(comparison, samples, rates, leaders))
+    order, order_text = _paper_order(comparison, samples, rates)
     parts.append(order_text)
     head = f"With {number(samples, 'demonstration')}"
     text = " ".join(sentence(part) for part in parts if part)
-    return Verdict(samples, leaders, level, order, winner, head, text)
+    return Conclusion(samples, leaders, level, order, winner, head, text)
 
 
-def _leading(leaders: list[str], value: Rate) -> str:
+def _leading(leaders: list[str], value: SuccessRate) -> str:
     names = joined([in_text(name) for name in leaders])
     if len(leaders) == 1:
         return f"{names} reached the most, {rate(value)}"
@@ -237,9 +238,9 @@ def _winner(leaders: list[str], level: list[str]) -> str:
 
 
 def _beaten(
-    contest: Contest,
+    comparison: SchemeComparison,
     samples: int,
-    rates: dict[str, Rate],
+    rates: dict[str, SuccessRate],
     leaders: list[str],
 ) -> str:
     """How the transfers stand to the best of the others."""
@@ -252,7 +253,7 @@ def _beaten(
         (n for n in leaders if n not in TRANSFERS),
         max(ordered(others), key=lambda n: rates[n].mean),
     )
-    compared = contest.compare(rival, ours, samples)
+    compared = comparison.compare(rival, ours, samples)
     relation = _relation(compared)
     return (
         f"So {in_text(rival)} was {relation} transfer here "
@@ -274,18 +275,18 @@ def _relation(compared: Comparison) -> str:
 
 
 def _paper_order(
-    contest: Contest, samples: int, rates: dict[str, Rate]
+    comparison: SchemeComparison, samples: int, rates: dict[str, SuccessRate]
 ) -> tuple[str, str]:
     if not {name for pair in PAPER_ORDER for name in pair} <= rates.keys():
         return "", ""
     failed, doubtful = [], []
     for a, b in PAPER_ORDER:
-        compared = contest.compare(a, b, samples)
+        compared = comparison.compare(a, b, samples)
         difference = rates[a].mean - rates[b].mean
         p = p_value(compared.p)
         both = f"{percent(rates[b].mean)} against {percent(rates[a].mean)}"
         if difference <= -_EQUAL:
-            relation = _relation(contest.compare(b, a, samples))
+            relation = _relation(comparison.compare(b, a, samples))
             failed.append(
                 f"{in_text(b)} was {relation} {in_text(a)} ({both}, {p})"
             )
@@ -302,7 +303,7 @@ def _paper_order(
         f"{percent(rates['unchanged'].mean)}"
     )
     if doubtful:
-        if not contest.tested:
+        if not comparison.tested:
             return "in the means", (
                 f"the paper's order came out in the means ({chain}); so few "
                 "trials are no test of it"
@@ -316,12 +317,12 @@ def _paper_order(
     )
 
 
-def toy_gain(toy: dict[str, Any]) -> str:
+def toy_gain(toy: ToyResults) -> str:
     """What transfer does on the toy, in one sentence."""
-    transfers = toy["transfer"]
+    transfers = toy.transfer
     name = "default" if "default" in transfers else next(iter(transfers))
-    ours = transfers[name]["other_mse_mean"]
-    turned = toy["source"]["rotated_mse"]
+    ours = transfers[name].other_mse_mean
+    turned = toy.source.rotated_mse
     return (
         f"From five points, transfer brings the error on the turned square "
         f"from {turned:.3g} down to {ours:.2g}"

@@ -1,0 +1,431 @@
+"""Charts of the schemes of transfer in one changed view (paper Fig. 5)."""
+
+import math
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from drake_affetto.experiments.results import (
+    TransferMap,
+)
+from drake_affetto.report import wording
+from drake_affetto.report.comparison import SchemeComparison
+from drake_affetto.report.style import (
+    LIGHT,
+    Chart,
+    diverging_scale,
+    escaped,
+    make_figure,
+    percent_axis,
+    reference_line,
+    scheme_color,
+    scheme_marker,
+    signed,
+    whiskers,
+    with_lines,
+    wrapped,
+)
+from drake_affetto.sound.reward import SUCCESS_THRESHOLD
+
+
+def success_by_scheme(comparison: SchemeComparison) -> Chart:
+    """Fig. 5a: success by scheme and number of samples, with intervals."""
+    names = wording.ordered(comparison.rates)
+    rows = [
+        [wording.scheme(name, full=True)]
+        + [wording.rate(comparison.rates[name][n]) for n in comparison.samples]
+        for name in names
+    ]
+    several = len(comparison.samples) > 1
+    traces: list[Any] = []
+    # Along the axis: a place for each number of samples, or for each scheme.
+    width = 0.86 / len(names)
+    for k, name in enumerate(names):
+        found = [comparison.rates[name][n] for n in comparison.samples]
+        shift = (k - 0.5 * (len(names) - 1)) * width
+        place = [i + shift for i in range(len(found))] if several else [k]
+        mean = [100 * r.mean for r in found]
+        along, across = ("x", "y") if several else ("y", "x")
+        error = whiskers(found) | {"color": LIGHT["ink"], "thickness": 1.4}
+        # The bar is pale, so that the whisker is seen on it in any theme.
+        traces.append(
+            go.Bar(
+                {along: place, across: mean},
+                orientation="v" if several else "h",
+                width=0.9 * width if several else 0.62,
+                marker={"color": scheme_color(name)},
+                opacity=0.4,
+                hoverinfo="skip",
+                showlegend=False,
+                legendgroup=name,
+            )
+        )
+        traces.append(
+            go.Scatter(
+                {along: place, across: mean, f"error_{across}": error},
+                name=escaped(wording.scheme(name)),
+                mode="markers",
+                marker=scheme_marker(name),
+                customdata=[[100 * r.low, 100 * r.high] for r in found],
+                hovertemplate=f"%{{{across}:.0f}} % (%{{customdata[0]:.0f}} "
+                "to %{customdata[1]:.0f})<extra>"
+                + escaped(wording.scheme(name))
+                + "</extra>",
+                showlegend=several,
+                legendgroup=name,
+            )
+        )
+    if several:
+        figure = make_figure(
+            traces,
+            x={
+                "title": {"text": "new demonstrations"},
+                "tickvals": list(range(len(comparison.samples))),
+                "ticktext": [str(n) for n in comparison.samples],
+                "showgrid": False,
+            },
+            y=percent_axis("success at unseen positions"),
+        )
+    else:
+        n = comparison.samples[0]
+        figure = make_figure(
+            traces,
+            x=percent_axis("success at unseen positions"),
+            y={
+                "tickvals": list(range(len(names))),
+                "ticktext": [
+                    f"{escaped(wording.scheme(name))}<br><b>"
+                    f"{wording.percent(comparison.rates[name][n].mean)}</b>"
+                    for name in names
+                ],
+                "range": [len(names) - 0.5, -0.5],
+                "showgrid": False,
+            },
+        )
+    counts = wording.joined([str(n) for n in comparison.samples])
+    return Chart(
+        "schemes",
+        f"Success in the new view ({wording.scenario(comparison.scenario)})",
+        f"Fig. 5a. The drum is seen otherwise than it was taught; {counts} new "
+        "demonstrations may be used. Share of "
+        f"{wording.number(comparison.trials, 'trial')} per scheme"
+        f"{' and number of demonstrations' if several else ''} in which the "
+        f"drum was heard; whiskers: {comparison.error_bars}.",
+        "Highest with "
+        + "; with ".join(
+            f"{wording.number(n, 'demonstration')}: "
+            + wording.joined([wording.in_text(k) for k in conclusion.leaders])
+            for n in comparison.samples
+            for conclusion in [wording.conclude(comparison, n)]
+        )
+        + ".",
+        figure,
+        ("scheme", *(f"{n} demonstrations" for n in comparison.samples)),
+        rows,
+        420 if several else 60 + 52 * len(names),
+        wide=several,
+    )
+
+
+def rewards_by_scheme(comparison: SchemeComparison) -> Chart | None:
+    """Every trial's reward, at the greatest number of samples."""
+    n = comparison.samples[-1]
+    names = [
+        name for name in wording.ordered(comparison.rewards)
+        if comparison.rewards[name][n]
+    ]  # fmt: skip
+    if not names:
+        return None
+    traces = []
+    rows = []
+    for row, name in enumerate(names):
+        values = comparison.rewards[name][n]
+        # Spread by rank rather than by chance: the same page each time.
+        spread = [0.28 * math.sin(2.4 * i) for i in range(len(values))]
+        traces.append(
+            go.Scatter(
+                x=values,
+                y=[row + s for s in spread],
+                name=escaped(wording.scheme(name)),
+                mode="markers",
+                marker=scheme_marker(name),
+                opacity=0.8,
+                showlegend=False,
+                hovertemplate="R = %{x:.2f}<extra>"
+                + escaped(wording.scheme(name))
+                + "</extra>",
+            )
+        )
+        heard = sum(v > SUCCESS_THRESHOLD for v in values)
+        rows.append(
+            [
+                wording.scheme(name, full=True),
+                len(values),
+                heard,
+                f"{np.median(values):.2f}",
+                f"{min(values):.2f}",
+                f"{max(values):.2f}",
+            ]
+        )
+    everything = [v for name in names for v in comparison.rewards[name][n]]
+    low, high = min(everything), max(everything)
+    figure = make_figure(
+        traces,
+        x={
+            "title": {"text": "reward R of each trial"},
+            "range": [
+                min(0.0, low) - 0.03,
+                max(high, SUCCESS_THRESHOLD) + 0.05,
+            ],
+        },
+        y={
+            "tickvals": list(range(len(names))),
+            "ticktext": [escaped(wording.scheme(name)) for name in names],
+            "range": [len(names) - 0.1, -0.5],
+            "showgrid": False,
+        },
+        **with_lines(
+            reference_line(
+                SUCCESS_THRESHOLD,
+                f"R = {SUCCESS_THRESHOLD:g}",
+                LIGHT["muted"],
+                vertical=True,
+                position="start",
+            )
+        ),
+    )
+    return Chart(
+        "rewards",
+        "The sound behind the rates",
+        f"Every trial after {wording.number(n, 'demonstration')}, by its "
+        "reward: right of the line the drum was heard. Near zero the hand "
+        "missed; a high reward is a clean stroke.",
+        f"Rewards of single trials by scheme, from {low:.2f} to {high:.2f}.",
+        figure,
+        ("scheme", "trials", "heard", "median R", "least R", "greatest R"),
+        rows,
+        80 + 50 * len(names),
+    )
+
+
+def significance(comparison: SchemeComparison, samples: int) -> Chart:
+    """Fig. 5b: pairwise differences of the rates with their significance."""
+    names = wording.ordered(comparison.rates)
+    labels = [wrapped(wording.scheme(name), 10) for name in names]
+    values: list[list[float | None]] = []
+    shown: list[list[str]] = []
+    hovers: list[list[str]] = []
+    rows = []
+    for i, a in enumerate(names):
+        values.append([])
+        shown.append([])
+        hovers.append([])
+        for j, b in enumerate(names):
+            if a == b:
+                values[-1].append(None)
+                shown[-1].append("")
+                hovers[-1].append("")
+                continue
+            found = comparison.compare(a, b, samples)
+            values[-1].append(round(100 * found.difference, 1))
+            shown[-1].append(
+                signed(100 * found.difference) + ("*" if found.clear else "")
+            )
+            effect = (
+                ""
+                if found.effect_size is None
+                else f"<br>effect size (Cohen's h) {found.effect_size:+.2f}"
+            )
+            hovers[-1].append(
+                f"{escaped(wording.scheme(a))} − {escaped(wording.scheme(b))}: "
+                f"{wording.points(found.difference)}"
+                f"<br>corrected {wording.p_value(found.p)}{effect}"
+            )
+            if i < j:
+                rows.append(
+                    [
+                        f"{wording.scheme(a)} − {wording.scheme(b)}",
+                        wording.points(found.difference),
+                        wording.p_value(found.p_single),
+                        wording.p_value(found.p),
+                        "–"
+                        if found.effect_size is None
+                        else f"{found.effect_size:+.2f}",
+                        "yes" if found.clear else "no",
+                    ]
+                )
+    figure = make_figure(
+        [
+            go.Heatmap(
+                z=values,
+                x=labels,
+                y=labels,
+                text=shown,
+                customdata=hovers,
+                texttemplate="%{text}",
+                textfont={"size": 11, "color": LIGHT["ink"]},
+                hovertemplate="%{customdata}<extra></extra>",
+                hoverongaps=False,
+                zmin=-100,
+                zmax=100,
+                colorscale=diverging_scale(),
+                showscale=False,
+                xgap=2,
+                ygap=2,
+            )
+        ],
+        x={"side": "bottom", "tickangle": -90, "showgrid": False},
+        y={"autorange": "reversed", "showgrid": False},
+    )
+    clear = [row for row in rows if row[-1] == "yes"]
+    return Chart(
+        f"significance-{samples}",
+        f"With {wording.number(samples, 'demonstration')}",
+        "Row minus column, in percentage points; a star marks a difference "
+        "with a corrected p below 0.05. Touch a cell for p and effect size "
+        "(Cohen's h).",
+        f"{len(clear)} of {len(rows)} pairs differ significantly"
+        + (": " + "; ".join(f"{r[0]} {r[1]}" for r in clear) if clear else "")
+        + ".",
+        figure,
+        (
+            "pair",
+            "difference",
+            "p",
+            "corrected p",
+            "effect size",
+            "significant",
+        ),
+        rows,
+        380,
+    )
+
+
+def transfer_map(grid: TransferMap) -> list[Chart]:
+    """The map h: a grid of what is seen now, and where h puts it."""
+    n_rows, n_columns = grid.shape
+    charts = []
+    for part, title, caption in (
+        (
+            "input",
+            "What the robot sees now",
+            "A regular grid over the image of the new view; the numbers are "
+            "the places it was shown.",
+        ),
+        (
+            "output",
+            "Where the map h puts it",
+            "The same grid through h, in the task space of the old skill: a "
+            "turned, stretched or mirrored grid is what the map has found out "
+            "about the new view. Numbers are the same places.",
+        ),
+    ):
+        points = np.array(getattr(grid, part), dtype=float)
+        net = points.reshape(n_rows, n_columns, 2)
+        taught = np.array(getattr(grid, f"taught_{part}"), dtype=float).reshape(
+            -1, 2
+        )
+        names = getattr(grid, f"{part}_names")
+        # As in images.
+        downwards = names[1].startswith("y_img")
+        traces: list[Any] = []
+        for lines, key, label in (
+            (net, "plus", "first direction"),
+            (net.transpose(1, 0, 2), "minus", "second direction"),
+        ):
+            joined = np.concatenate(
+                [np.vstack([line, [[np.nan, np.nan]]]) for line in lines]
+            )
+            traces.append(
+                go.Scatter(
+                    x=_gaps(joined[:, 0]),
+                    y=_gaps(joined[:, 1]),
+                    mode="lines",
+                    name=label,
+                    line={
+                        "color": LIGHT[key],
+                        "width": 1.4,
+                        "dash": "solid" if key == "plus" else "dot",
+                    },
+                    hoverinfo="skip",
+                    showlegend=False,
+                )
+            )
+        corners = [net[0, 0], net[0, -1], net[-1, -1], net[-1, 0]]
+        traces.append(
+            go.Scatter(
+                x=[float(c[0]) for c in corners],
+                y=[float(c[1]) for c in corners],
+                mode="markers+text",
+                text=["A", "B", "C", "D"],
+                textposition=_outward(corners, downwards),
+                textfont={"size": 14, "color": LIGHT["ink"]},
+                marker={"size": 7, "color": LIGHT["ink"]},
+                cliponaxis=False,
+                showlegend=False,
+                hovertemplate="corner %{text}: %{x:.2f}, %{y:.2f}"
+                "<extra></extra>",
+            )
+        )
+        traces.append(
+            go.Scatter(
+                x=taught[:, 0].tolist(),
+                y=taught[:, 1].tolist(),
+                mode="markers+text",
+                text=[str(i + 1) for i in range(len(taught))],
+                textposition="middle center",
+                textfont={"size": 11, "color": LIGHT["surface"]},
+                marker={"size": 19, "color": LIGHT["paper"]},
+                showlegend=False,
+                hovertemplate="demonstration %{text}: %{x:.2f}, %{y:.2f}"
+                "<extra></extra>",
+            )
+        )
+        figure = make_figure(
+            traces,
+            x={"title": {"text": escaped(names[0])}, "showgrid": False},
+            y={"title": {"text": escaped(names[1])}, "showgrid": False},
+        )
+        if downwards:
+            figure.update_yaxes(autorange="reversed")
+        charts.append(
+            Chart(
+                f"map-{part}",
+                title,
+                caption,
+                f"A grid of {n_rows} by {n_columns} points over {names[0]} and "
+                f"{names[1]}; its corners are at "
+                + wording.joined([f"({c[0]:.2f}, {c[1]:.2f})" for c in corners])
+                + ".",
+                figure,
+                ("point", names[0], names[1]),
+                [
+                    [label, f"{x:.3f}", f"{y:.3f}"]
+                    for label, (x, y) in [
+                        *zip("ABCD", corners, strict=True),
+                        *(
+                            (f"demonstration {i + 1}", p)
+                            for i, p in enumerate(taught)
+                        ),
+                    ]
+                ],
+                360,
+            )
+        )
+    return charts
+
+
+def _gaps(values: np.ndarray) -> list[float | None]:
+    """With None for NaN, which JSON has not."""
+    return [None if math.isnan(v) else float(v) for v in values]
+
+
+def _outward(corners: list[np.ndarray], downwards: bool) -> list[str]:
+    """Where a label stands so that it does not lie on the net."""
+    middle = np.mean(corners, axis=0)
+    return [
+        ("top" if (c[1] > middle[1]) != downwards else "bottom")
+        + (" right" if c[0] > middle[0] else " left")
+        for c in corners
+    ]

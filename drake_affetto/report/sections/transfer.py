@@ -1,0 +1,92 @@
+"""The schemes of transfer in one changed view (paper Fig. 5)."""
+
+import dataclasses
+
+from drake_affetto.report import wording
+from drake_affetto.report.charts.transfer import (
+    rewards_by_scheme,
+    significance,
+    success_by_scheme,
+    transfer_map,
+)
+from drake_affetto.report.comparison import SchemeComparison
+from drake_affetto.report.parts import Section, Statement, in_pairs
+from drake_affetto.report.report_data import ReportData
+from drake_affetto.report.style import DARK, LIGHT, scheme_color
+from drake_affetto.report.wording import conclude
+
+
+def make(data: ReportData) -> Section | None:
+    """The section; None if no schemes were compared."""
+    comparison = data.comparison
+    if comparison is None:
+        return None
+    in_mirror = comparison.scenario == "mirror"
+    charts = [success_by_scheme(comparison)]
+    rewards = rewards_by_scheme(comparison)
+    if rewards:
+        charts.append(rewards)
+    matrices = []
+    if comparison.tested:
+        matrices = [significance(comparison, n) for n in comparison.samples]
+    maps, scheme, count = [], "", ""
+    if comparison.map:
+        maps = transfer_map(comparison.map)
+        scheme = wording.in_text(comparison.map.scheme)
+        count = wording.number(comparison.map.samples, "demonstration")
+    conclusions = [conclude(comparison, n) for n in comparison.samples]
+    return Section(
+        "mirror",
+        "Through the mirror" if in_mirror else "Seen otherwise",
+        ("Through the mirror" if in_mirror else "Seen otherwise")
+        + ": which scheme carries over?",
+        {
+            "in_mirror": in_mirror,
+            "scenario": wording.scenario(comparison.scenario),
+            "statements": [
+                Statement(each.winner, each.head, each.text)
+                for each in conclusions
+            ],
+            "untested": not comparison.tested and comparison.trials > 0,
+            "trials": comparison.trials,
+            "trials_text": wording.number(comparison.trials, "trial"),
+            "charts": in_pairs(charts),
+            "key": _key(comparison),
+            "matrices": matrices,
+            "maps": in_pairs(maps),
+            "map_scheme": scheme,
+            "map_samples": count,
+        },
+        (*charts, *matrices, *maps),
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class KeyEntry:
+    """A scheme with its colors and meaning.
+
+    Attributes:
+        name: Name of the scheme.
+        meaning: What it does.
+        light: Color on a light page.
+        dark: Color on a dark page.
+    """
+
+    name: str
+    meaning: str
+    light: str
+    dark: str
+
+
+def _key(comparison: SchemeComparison) -> list[KeyEntry]:
+    dark = {LIGHT[name]: DARK[name] for name in LIGHT}
+    entries = []
+    for name in wording.ordered(comparison.rates):
+        color = scheme_color(name)
+        _, _, meaning = wording.SCHEMES.get(name, ("", "", ""))
+        entries.append(
+            KeyEntry(
+                wording.scheme(name, full=True), meaning, color, dark[color]
+            )
+        )
+    return entries
