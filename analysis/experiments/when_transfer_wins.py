@@ -25,15 +25,14 @@ from rich.console import Console
 
 from drake_affetto import __version__
 from drake_affetto.cli.options import (
-    STORE,
     add_plan_arguments,
     add_study_arguments,
     check_study_arguments,
     make_plan,
-    trial_executor,
+    study,
 )
 from drake_affetto.common.errors import InputError
-from drake_affetto.common.output import atomic_path, prepare_output, write_json
+from drake_affetto.common.output import atomic_path, write_json
 from drake_affetto.experiments.mirror import run_mirror
 from drake_affetto.experiments.plans import MirrorPlan
 from drake_affetto.experiments.results import ConditionRow, ConditionsResults
@@ -131,9 +130,11 @@ def main() -> int:
         )
         base.check()
         check_study_arguments(args)
-        out = prepare_output(args.out)
         rows = []
-        with trial_executor(args, out / STORE, console) as executor:
+        with study(args, console, base.direct, base.scenario) as (
+            out,
+            executor,
+        ):
             for condition, changes in CONDITIONS.items():
                 name = ": ".join(condition)
                 plan = dataclasses.replace(base, name=name, **changes)

@@ -1,6 +1,7 @@
 """`affetto demo`: the whole story at small scale."""
 
 import argparse
+import contextlib
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from drake_affetto.cli.options import (
     make_plan,
     tells_how_to_continue,
     worker_count,
+    worker_pool,
 )
 from drake_affetto.common.fields import check_ranges
 from drake_affetto.common.output import prepare_output
@@ -38,25 +40,31 @@ def run(args: argparse.Namespace) -> int:
     """Runs the demo; returns the exit code."""
     plan = make_plan(DemoPlan, args)
     check_ranges(plan)
-    workers = worker_count(args)
+    worker_count(args)
     out = prepare_output(args.out)
 
     from rich.console import Console
 
-    from drake_affetto.experiments.demo import run_demo
-    from drake_affetto.report import write_report
-
     console = Console()
-    with tells_how_to_continue(console, out):
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(tells_how_to_continue(console, out))
+        pool = None
+        if not args.meshcat:
+            pool = stack.enter_context(worker_pool(args, plan.drum.scenario))
+        with console.status("Starting"):
+            from drake_affetto.experiments.demo import run_demo
         results = run_demo(
             out,
             plan,
-            workers=workers,
+            pool=pool,
             watch=args.meshcat,
             restart=args.restart,
             console=console,
         )
     _print_tables(results, console)
+
+    from drake_affetto.report import write_report
+
     page = write_report([out], out / "report.html")
     console.print(
         f"Results, pictures, sounds and the replay are in {out}; the page "

@@ -4,15 +4,14 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from drake_affetto.cli.options import (
-    STORE,
     add_plan_arguments,
     add_study_arguments,
     check_study_arguments,
     make_plan,
     rate_text,
-    trial_executor,
+    study,
 )
-from drake_affetto.common.output import prepare_output, write_json
+from drake_affetto.common.output import write_json
 from drake_affetto.experiments.plans import DrumPlan
 
 if TYPE_CHECKING:
@@ -33,12 +32,8 @@ def run(args: argparse.Namespace) -> int:
 
     from rich.console import Console
 
-    from drake_affetto.station.scenario import load_scenario
-
-    load_scenario(plan.scenario)
-    out = prepare_output(args.out)
     console = Console()
-    with trial_executor(args, out / STORE, console) as executor:
+    with study(args, console, plan.scenario) as (out, executor):
         from drake_affetto.experiments.drumming import run_drum
 
         results = run_drum(executor, plan)

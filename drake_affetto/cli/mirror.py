@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from drake_affetto import __version__
 from drake_affetto.cli.options import (
-    STORE,
     add_plan_arguments,
     add_study_arguments,
     check_study_arguments,
     make_plan,
     rate_text,
-    trial_executor,
+    study,
 )
-from drake_affetto.common.output import prepare_output, write_json
+from drake_affetto.common.output import write_json
 from drake_affetto.experiments.plans import MirrorPlan
 
 if TYPE_CHECKING:
@@ -66,13 +65,10 @@ def run(args: argparse.Namespace) -> int:
 
     from rich.console import Console
 
-    from drake_affetto.station.scenario import load_scenario
-
-    load_scenario(plan.scenario)
-    out = prepare_output(args.out)
     console = Console()
     found = {}
-    with trial_executor(args, out / STORE, console) as executor:
+    # The first trials teach the skill in direct view.
+    with study(args, console, plan.direct, plan.scenario) as (out, executor):
         from drake_affetto.experiments.mirror import changed_views, run_mirror
 
         names = changed_views() if args.all_scenarios else [plan.scenario]

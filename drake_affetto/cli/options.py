@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from drake_affetto.common.errors import InputError, require_range
 from drake_affetto.common.fields import option_name
+from drake_affetto.common.output import prepare_output
 
 if TYPE_CHECKING:
     from drake_affetto.runner.executor import TrialExecutor
+    from drake_affetto.runner.workers import WorkerPool
 
 STORE = "trials.sqlite"
 WORKERS = 2
@@ -179,8 +181,43 @@ def tells_how_to_continue(console: Any, out: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
+def worker_pool(
+    args: argparse.Namespace, scenario: str
+) -> Iterator["WorkerPool"]:
+    """Workers of a study that was called with the shared options.
+
+    Worker processes begin at once to import what they need, while this
+    process does so too.
+
+    Args:
+        args: Parsed options.
+        scenario: Scenario of the first trials, by name or path.
+    """
+    from drake_affetto.experiments.worker import prepare
+    from drake_affetto.runner.workers import WorkerPool
+
+    with contextlib.ExitStack() as stack:
+        cluster = None
+        if getattr(args, "dask", None) is not None:
+            from drake_affetto.experiments.trials import software
+            from drake_affetto.runner.dask_cluster import cluster_executor
+
+            cluster = stack.enter_context(cluster_executor(args.dask, software))
+        pool = stack.enter_context(
+            WorkerPool(
+                worker_count(args),
+                cluster,
+                prepare=prepare,
+                arguments=(scenario,),
+            )
+        )
+        pool.start()
+        yield pool
+
+
+@contextlib.contextmanager
 def trial_executor(
-    args: argparse.Namespace, path: Path, console: Any
+    args: argparse.Namespace, path: Path, console: Any, pool: "WorkerPool"
 ) -> Iterator["TrialExecutor"]:
     """The executor of a study that was called with the shared options.
 
@@ -188,36 +225,54 @@ def trial_executor(
         args: Parsed options.
         path: File of the study's trials.
         console: A rich console.
+        pool: Workers of the study.
 
     Yields:
         An executor whose trials are kept in `path`.
     """
-    from drake_affetto.experiments.trials import run_task, software
+    from drake_affetto.experiments.worker import run_task
     from drake_affetto.runner.executor import TrialExecutor
     from drake_affetto.runner.store import TrialStore
 
-    with contextlib.ExitStack() as stack:
-        store = stack.enter_context(TrialStore(path))
+    with (
+        TrialStore(path) as store,
+        tells_how_to_continue(console, path.parent),
+    ):
         for folder in args.reuse:
             taken = store.merge(Path(folder) / STORE)
             console.print(f"{taken} finished trials taken over from {folder}")
-        cluster = None
-        if args.dask is not None:
-            from drake_affetto.runner.dask_cluster import cluster_executor
-
-            cluster = stack.enter_context(cluster_executor(args.dask, software))
-        stack.enter_context(tells_how_to_continue(console, path.parent))
-        executor = stack.enter_context(
-            TrialExecutor(
-                run_task,
-                store,
-                workers=worker_count(args),
-                executor=cluster,
-            )
-        )
-        yield executor
+        with TrialExecutor(run_task, store, pool=pool) as executor:
+            yield executor
         if executor.reused:
             console.print(f"{executor.reused} trials were finished already")
+
+
+@contextlib.contextmanager
+def study(
+    args: argparse.Namespace, console: Any, *scenarios: str
+) -> Iterator[tuple[Path, "TrialExecutor"]]:
+    """Folder and executor of a study on the robot.
+
+    The workers start first, for that takes longest. The folder is made only
+    if the scenarios fit.
+
+    Args:
+        args: Parsed options.
+        console: A rich console.
+        scenarios: Scenarios by name or path, that of the first trials first.
+
+    Yields:
+        The folder of the results and the executor of the trials.
+    """
+    with worker_pool(args, scenarios[0]) as pool:
+        with console.status(f"Starting {pool.workers} workers"):
+            from drake_affetto.station.scenario import load_scenario
+
+            for scenario in scenarios:
+                load_scenario(scenario)
+            out = prepare_output(args.out)
+        with trial_executor(args, out / STORE, console, pool) as executor:
+            yield out, executor
 
 
 def rate_text(rate: Any) -> str:

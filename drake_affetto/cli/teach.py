@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drake_affetto.cli.options import (
@@ -11,6 +10,7 @@ from drake_affetto.cli.options import (
     check_study_arguments,
     make_plan,
     trial_executor,
+    worker_pool,
 )
 from drake_affetto.common.fields import check_ranges
 from drake_affetto.experiments.plans import TeachPlan
@@ -63,11 +63,11 @@ def run(args: argparse.Namespace) -> int:
 
             outcomes = teach_by_mouse(session, console)
         else:
-
-            def executor(path: Path) -> Any:
-                return trial_executor(args, path, console)
-
-            outcomes = teach(session, executor)
+            with worker_pool(args, plan.scenario) as pool:
+                outcomes = teach(
+                    session,
+                    lambda path: trial_executor(args, path, console, pool),
+                )
     except KeyboardInterrupt:
         console.print(
             f"{len(session.taught)} of {plan.demonstrations} positions are in "

@@ -28,6 +28,7 @@ from drake_affetto.experiments.results import (
 from drake_affetto.experiments.trials import run_task
 from drake_affetto.runner.executor import TrialExecutor
 from drake_affetto.runner.store import TrialStore, remove_store
+from drake_affetto.runner.workers import WorkerPool
 from drake_affetto.station.scenario import load_scenario
 
 
@@ -36,6 +37,7 @@ def run_demo(
     plan: DemoPlan,
     *,
     workers: int = 2,
+    pool: WorkerPool | None = None,
     watch: bool = False,
     restart: bool = False,
     console: Any = None,
@@ -47,6 +49,7 @@ def run_demo(
         out: Folder, prepared.
         plan: How much to do.
         workers: Number of worker processes; 0 for this one.
+        pool: Workers that run already, instead of `workers` new ones.
         watch: Whether to show the trials in Meshcat, in this process.
         restart: Whether to run finished trials again.
         console: A rich console for messages; None for silence.
@@ -62,7 +65,9 @@ def run_demo(
     with contextlib.ExitStack() as stack:
         store = stack.enter_context(TrialStore(path))
         executor = stack.enter_context(
-            TrialExecutor(run, store, workers=workers, quiet=console is None)
+            TrialExecutor(
+                run, store, workers=workers, pool=pool, quiet=console is None
+            )
         )
         drum = run_drum(executor, plan.drum)
         outcome = run_mirror(executor, plan.mirror)

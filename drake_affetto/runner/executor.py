@@ -6,7 +6,7 @@ it.
 """
 
 from collections.abc import Callable, Hashable, Mapping
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from typing import Any, TypeVar
 
 import numpy as np
@@ -31,6 +31,7 @@ class TrialExecutor:
         *,
         workers: int = 2,
         executor: Executor | None = None,
+        pool: WorkerPool | None = None,
         quiet: bool = False,
     ):
         """Takes `run`, a module's function, that runs one spec.
@@ -41,21 +42,41 @@ class TrialExecutor:
             workers: Number of processes; see `make_executor`.
             executor: Any other executor, such as a Dask cluster's, instead of
                 worker processes. It is left open.
+            pool: Workers that run already, instead of `workers` new ones or
+                `executor`. The pool is left open.
             quiet: Whether there is no progress display.
         """
         self._run = run
         self._store = store
-        self._pool = WorkerPool(workers, executor)
+        self._owned = pool is None
+        self._pool = pool or WorkerPool(workers, executor)
         self._progress = make_progress(quiet=quiet)
         self.reused = 0
 
     def __enter__(self) -> "TrialExecutor":
         self._progress.start()
+        self._show_start()
         return self
+
+    def _show_start(self) -> None:
+        """Shows that workers start, until the first of them is ready."""
+        starting = self._pool.starting
+        if not starting:
+            return
+        bar = self._progress.add_task(
+            f"Starting {len(starting)} workers", total=None
+        )
+
+        def hide(_: Future) -> None:
+            self._progress.update(bar, visible=False)
+
+        for future in starting:
+            future.add_done_callback(hide)
 
     def __exit__(self, *exception: Any) -> None:
         self._progress.stop()
-        self._pool.__exit__(*exception)
+        if self._owned:
+            self._pool.__exit__(*exception)
 
     def run(
         self,

@@ -14,6 +14,7 @@ from concurrent.futures import (
     wait,
 )
 import contextlib
+import functools
 import itertools
 import multiprocessing
 import os
@@ -45,7 +46,9 @@ class InProcessExecutor(Executor):
         return future
 
 
-def _begin_worker() -> None:
+def _begin_worker(
+    prepare: Callable[..., None] | None, arguments: Sequence[Any]
+) -> None:
     """What a worker process does first."""
     # Its linear algebra keeps to its own core.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
@@ -53,6 +56,12 @@ def _begin_worker() -> None:
     # Ctrl-C reaches the whole group; only the study's process answers it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    if prepare is not None:
+        prepare(*arguments)
+
+
+def _ready() -> None:
+    """The first call of a worker, which ends when it is prepared."""
 
 
 def _end_with_parent() -> None:
@@ -63,11 +72,22 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def make_executor(workers: int) -> Executor:
+def make_executor(
+    workers: int,
+    prepare: Callable[..., None] | None = None,
+    arguments: Sequence[Any] = (),
+) -> Executor:
     """Worker processes, or this process where `workers` is 0.
 
     Processes are spawned, not forked: neither Drake's renderer nor Python's
     threads survive a fork.
+
+    Args:
+        workers: Number of processes.
+        prepare: Function of a module that imports little, called in each
+            process when it starts, so that the first call need not wait for
+            imports.
+        arguments: Arguments of `prepare`.
     """
     if workers == 0:
         return InProcessExecutor()
@@ -75,25 +95,41 @@ def make_executor(workers: int) -> Executor:
         workers,
         mp_context=multiprocessing.get_context("spawn"),
         initializer=_begin_worker,
+        initargs=(prepare, tuple(arguments)),
     )
 
 
 class WorkerPool:
     """An executor that is replaced when its processes have died."""
 
-    def __init__(self, workers: int = 2, executor: Executor | None = None):
+    def __init__(
+        self,
+        workers: int = 2,
+        executor: Executor | None = None,
+        *,
+        prepare: Callable[..., None] | None = None,
+        arguments: Sequence[Any] = (),
+    ):
         """Makes the executor.
 
         Args:
             workers: Number of processes; see `make_executor`.
             executor: Any other executor, such as a Dask cluster's, instead of
                 worker processes. It is left open.
+            prepare: What each process calls first; see `make_executor`.
+            arguments: Arguments of `prepare`.
         """
-        self._workers = workers
+        self.workers = workers if executor is None else 0
+        self._make = functools.partial(
+            make_executor, workers, prepare, arguments
+        )
         self._owned = executor is None
+        # Processes that were started ahead of the first call; a future of
+        # each, which is done when a process is ready.
+        self.starting: list[Future] = []
         # How many calls are handed over at a time.
         self._ahead = max(1, 8 * workers) if self._owned else _CLUSTER_AHEAD
-        self._executor = executor or make_executor(workers)
+        self._executor = executor or self._make()
         # The processes of the call in progress, for the crash report: the
         # executor forgets them when it breaks.
         self._seen: list[Any] = []
@@ -103,6 +139,12 @@ class WorkerPool:
         """The executor of this moment; it changes after a worker's death."""
         return self._executor
 
+    def start(self) -> None:
+        """Starts the worker processes before there is anything to do."""
+        self.starting = [
+            self._executor.submit(_ready) for _ in range(self.workers)
+        ]
+
     def __enter__(self) -> "WorkerPool":
         return self
 
@@ -110,9 +152,11 @@ class WorkerPool:
         if not self._owned:
             return
         processes = self._processes()
-        self._executor.shutdown(wait=kind is None, cancel_futures=True)
-        if kind is not None:
-            # In the middle of a call, which is then not finished.
+        idle = kind is None and all(each.done() for each in self.starting)
+        self._executor.shutdown(wait=idle, cancel_futures=True)
+        if not idle:
+            # In the middle of a call, which is then not finished, or not even
+            # ready for one.
             for process in processes:
                 with contextlib.suppress(OSError, ValueError):
                     process.terminate()
@@ -160,7 +204,7 @@ class WorkerPool:
                     ) from error
                 if on_death is not None:
                     on_death(dead)
-                self._executor = make_executor(self._workers)
+                self._executor = self._make()
 
     def _run_once(
         self,
