@@ -88,7 +88,7 @@ def test_wheel_holds_the_package_and_every_model(wheel):
     assert not [name for name in held if "__pycache__" in name]
     expected = {
         path.relative_to(ROOT).as_posix()
-        for kind in ("py", "html", "css", "js", "jpg")
+        for kind in ("py", "j2", "css", "js", "jpg")
         for path in (ROOT / "drake_affetto").rglob(f"*.{kind}")
     } | {
         f"drake_affetto/{path.relative_to(ROOT).as_posix()}"
@@ -97,7 +97,7 @@ def test_wheel_holds_the_package_and_every_model(wheel):
     }
     assert expected - held == set()
     assert "drake_affetto/models/package.xml" in held
-    assert "drake_affetto/report/page.html" in held
+    assert "drake_affetto/report/templates/page.html.j2" in held
 
 
 @pytest.mark.slow

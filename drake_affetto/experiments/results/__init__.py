@@ -1,0 +1,102 @@
+"""Results of trials and studies, one dataclass a kind.
+
+The same dataclasses are written to the store and to results.json, and read
+from there: `pack` and `unpack` for trials, `to_plain` and `from_plain` of
+`drake_affetto.common.typed_json` for studies. The order of the fields is that
+of the JSON.
+"""
+
+from drake_affetto.experiments.results.demo import (
+    DemoDrumming,
+    DemoMirror,
+    DemoPosition,
+    DemoResults,
+    DemoScheme,
+    DemoTaught,
+    DemoTrial,
+)
+from drake_affetto.experiments.results.drumming import (
+    CurvePoint,
+    DrumResults,
+    EvaluatedPosition,
+    FinalTest,
+    LearningCurve,
+    RewardEvaluation,
+    RewardRow,
+    SimilarityTraces,
+    TaughtPosition,
+)
+from drake_affetto.experiments.results.mirror import (
+    ConditionRow,
+    ConditionsResults,
+    MirrorResults,
+    ScenariosResults,
+    SchemeCell,
+    SchemeComparisonRow,
+    TransferMap,
+)
+from drake_affetto.experiments.results.rates import SuccessRate
+from drake_affetto.experiments.results.study import STUDY_RESULTS, read_study
+from drake_affetto.experiments.results.toy import (
+    ToyFigures,
+    ToyMethod,
+    ToyPaper,
+    ToyPaperSource,
+    ToyPaperTransfer,
+    ToyResults,
+    ToySource,
+)
+from drake_affetto.experiments.results.trial import (
+    TRIAL_RESULTS,
+    DemonstrationResult,
+    DrummingResult,
+    GazeResult,
+    StrikeResult,
+    TrialResult,
+    pack,
+    unpack,
+)
+
+__all__ = [
+    "STUDY_RESULTS",
+    "TRIAL_RESULTS",
+    "ConditionRow",
+    "ConditionsResults",
+    "CurvePoint",
+    "DemoDrumming",
+    "DemoMirror",
+    "DemoPosition",
+    "DemoResults",
+    "DemoScheme",
+    "DemoTaught",
+    "DemoTrial",
+    "DemonstrationResult",
+    "DrumResults",
+    "DrummingResult",
+    "EvaluatedPosition",
+    "FinalTest",
+    "GazeResult",
+    "LearningCurve",
+    "MirrorResults",
+    "RewardEvaluation",
+    "RewardRow",
+    "ScenariosResults",
+    "SchemeCell",
+    "SchemeComparisonRow",
+    "SimilarityTraces",
+    "StrikeResult",
+    "SuccessRate",
+    "TaughtPosition",
+    "ToyFigures",
+    "ToyMethod",
+    "ToyPaper",
+    "ToyPaperSource",
+    "ToyPaperTransfer",
+    "ToyResults",
+    "ToySource",
+    "TransferMap",
+    "TrialResult",
+    "pack",
+    "read_study",
+    "unpack",
+]

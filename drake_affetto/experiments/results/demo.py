@@ -1,0 +1,124 @@
+"""Results of the demo."""
+
+import dataclasses
+from dataclasses import field
+
+from drake_affetto.experiments.results.rates import PROBABILITY, Position
+
+
+@dataclasses.dataclass(frozen=True)
+class DemoTaught:
+    """A demonstration of the demo.
+
+    Attributes:
+        xy: Position of the drum, m.
+        tau: Task parameter τ (2,).
+        attempts: Number of times that the movement was demonstrated.
+        reward: Reward of the best replay.
+        success: Whether the robot's own replay made the drum sound.
+    """
+
+    xy: Position
+    tau: list[float]
+    attempts: int
+    reward: float
+    success: bool = True
+
+
+@dataclasses.dataclass(frozen=True)
+class DemoTrial:
+    """A trial of the demo.
+
+    Attributes:
+        xy: Position of the drum, m.
+        tau: Task parameter τ (2,).
+        reward: Reward from the sound.
+        success: Whether the reward is above the threshold.
+    """
+
+    xy: Position
+    tau: list[float]
+    reward: float
+    success: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class DemoDrumming:
+    """The demo's part in direct view.
+
+    Attributes:
+        demonstrations: Number of demonstrations that the skill learned from.
+        taught: The demonstrations.
+        positions: The trials at test positions.
+        success_rate: Share of successful trials.
+    """
+
+    demonstrations: int
+    taught: list[DemoTaught]
+    positions: list[DemoTrial]
+    success_rate: float = field(metadata=PROBABILITY)
+
+
+@dataclasses.dataclass(frozen=True)
+class DemoPosition:
+    """A test position before the mirror.
+
+    Attributes:
+        xy: Position of the drum, m.
+        tau: Task parameter τ̂ (2,); None in files of earlier versions.
+    """
+
+    xy: Position
+    tau: list[float] | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class DemoScheme:
+    """A scheme of transfer in the demo.
+
+    Attributes:
+        success_rate: Share of successful trials.
+        rewards: Reward at each test position.
+    """
+
+    success_rate: float = field(metadata=PROBABILITY)
+    rewards: list[float]
+
+
+@dataclasses.dataclass(frozen=True)
+class DemoMirror:
+    """The demo's part before the mirror.
+
+    Attributes:
+        samples: Number of demonstrations that the schemes were given.
+        taught: The demonstrations.
+        positions: The test positions.
+        schemes: Results by scheme.
+    """
+
+    samples: int
+    taught: list[DemoTaught]
+    positions: list[DemoPosition]
+    schemes: dict[str, DemoScheme]
+
+
+@dataclasses.dataclass(frozen=True)
+class DemoResults:
+    """results.json of `affetto demo`.
+
+    Attributes:
+        study: Kind of study, "demo".
+        version: Version of the package that ran it.
+        seed: Seed of everything that is random.
+        drumming: Part in direct view.
+        mirror: Part before the mirror.
+    """
+
+    study: str
+    version: str
+    seed: int
+    drumming: DemoDrumming
+    mirror: DemoMirror
+
+    def check(self, where: str) -> None:
+        """All parts fit each other."""

@@ -1,0 +1,205 @@
+"""Results of the drumming study."""
+
+import dataclasses
+from dataclasses import field
+
+from drake_affetto.common.errors import InputError
+from drake_affetto.experiments.results.rates import (
+    NOT_EMPTY,
+    PROBABILITY,
+    Position,
+    SuccessRate,
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class TaughtPosition:
+    """A position of the drum at which a demonstration was given.
+
+    Attributes:
+        repeat: Number of the study's repeat.
+        xy: Position of the drum, m.
+        tau: Task parameter τ (2,).
+        attempts: Number of times that the movement was demonstrated.
+        reward: Reward of the best replay.
+        max_pull: Greatest force of the teacher, N.
+    """
+
+    repeat: int
+    xy: Position
+    tau: list[float]
+    attempts: int
+    reward: float
+    max_pull: float | None
+
+
+@dataclasses.dataclass(frozen=True)
+class CurvePoint:
+    """The success after some demonstrations.
+
+    Attributes:
+        n: Number of demonstrations.
+        success_rate: Success at the test positions.
+        per_repeat: Share of successes in each repeat.
+    """
+
+    n: int
+    success_rate: SuccessRate
+    per_repeat: list[float] = field(default_factory=list)
+
+
+@dataclasses.dataclass(frozen=True)
+class LearningCurve:
+    """Success over the number of demonstrations.
+
+    Attributes:
+        by_demonstrations: Points of the curve, in order.
+        n_to_90: Number from which on success stays at 90 % or more.
+    """
+
+    by_demonstrations: list[CurvePoint] = field(metadata=NOT_EMPTY)
+    n_to_90: int | None
+
+
+@dataclasses.dataclass(frozen=True)
+class EvaluatedPosition:
+    """A trial at a test position.
+
+    Attributes:
+        repeat: Number of the study's repeat.
+        xy: Position of the drum, m.
+        tau: Task parameter τ (2,).
+        reward: Reward from the sound.
+        success: Whether the reward is above the threshold.
+        contact_impulse: Impulse on the drum's head, N s.
+    """
+
+    repeat: int
+    xy: Position
+    tau: list[float]
+    reward: float
+    success: bool
+    contact_impulse: float | None
+
+
+@dataclasses.dataclass(frozen=True)
+class FinalTest:
+    """The test after the last demonstration.
+
+    Attributes:
+        success_rate: Share of successful trials.
+        positions: The trials.
+    """
+
+    success_rate: float = field(metadata=PROBABILITY)
+    positions: list[EvaluatedPosition]
+
+
+@dataclasses.dataclass(frozen=True)
+class RewardEvaluation:
+    """The reward as a classifier, compared with the contact of the trial.
+
+    Attributes:
+        auc: Area under the ROC curve; None without both hits and misses.
+        threshold: Reward above which a trial is a success.
+        false_hits: Number of successes without contact.
+        missed_hits: Number of contacts without success.
+        impulse_threshold: Impulse on the head above which it was hit, N s.
+        trials: Number of trials.
+        hits: Number of trials in which the head was hit.
+    """
+
+    auc: float | None
+    threshold: float
+    false_hits: int
+    missed_hits: int
+    impulse_threshold: float
+    trials: int
+    hits: int
+
+
+@dataclasses.dataclass(frozen=True)
+class RewardRow:
+    """One trial's reward and contact.
+
+    Attributes:
+        order: Order of the demonstrations, "random" or "active".
+        repeat: Number of the study's repeat.
+        n: Number of demonstrations.
+        xy: Position of the drum, m.
+        reward: Reward from the sound.
+        impulse: Impulse on the drum's head, N s.
+    """
+
+    order: str
+    repeat: int
+    n: int
+    xy: Position
+    reward: float
+    impulse: float | None
+
+
+@dataclasses.dataclass(frozen=True)
+class SimilarityTraces:
+    """Similarity to the prototypes over time (paper Fig. 3b).
+
+    Attributes:
+        t: Times, s.
+        hit: Similarity in a trial that was a hit.
+        miss: Similarity in a trial that was a miss.
+    """
+
+    t: list[float]
+    hit: list[float]
+    miss: list[float]
+
+    def check(self, where: str) -> None:
+        """Raises InputError if the lists differ in length."""
+        if len({len(self.t), len(self.hit), len(self.miss)}) > 1:
+            raise InputError(f"{where} has lists of several lengths")
+
+
+@dataclasses.dataclass(frozen=True)
+class DrumResults:
+    """results.json of `affetto drum`.
+
+    Attributes:
+        study: Kind of study, "drum".
+        version: Version of the package that ran it.
+        seed: Seed of everything that is random.
+        scenario: Scenario, by name or path.
+        demonstrations: Number of demonstrations of a repeat.
+        evaluations: Number of test positions.
+        repeats: Number of repeats.
+        taught: Positions of all demonstrations.
+        first_try: Share of demonstrations that succeeded at once.
+        by_demonstrations: Learning curve in random order.
+        n_to_90: Number from which on success stays at 90 % or more.
+        active: Learning curve in the skill's own order; None if not tried.
+        final: Test after the last demonstration.
+        separation: How well the reward tells hits from misses.
+        rewards: Reward and contact of all trials.
+        similarity: Examples of Fig. 3b; None without both a hit and a miss.
+    """
+
+    study: str
+    version: str
+    seed: int
+    scenario: str
+    demonstrations: int
+    evaluations: int
+    repeats: int
+    taught: list[TaughtPosition]
+    first_try: float | None = field(metadata=PROBABILITY)
+    by_demonstrations: list[CurvePoint] = field(metadata=NOT_EMPTY)
+    n_to_90: int | None
+    active: LearningCurve | None
+    final: FinalTest
+    separation: RewardEvaluation
+    rewards: list[RewardRow]
+    similarity: SimilarityTraces | None = None
+
+    def check(self, where: str) -> None:
+        """Raises InputError where parts do not fit each other."""
+        if self.similarity is not None:
+            self.similarity.check(f"{where}similarity")

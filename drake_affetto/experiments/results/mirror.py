@@ -1,0 +1,214 @@
+"""Results of the studies of changed views and other conditions."""
+
+import dataclasses
+from dataclasses import field
+
+import numpy as np
+
+from drake_affetto.common.errors import InputError
+from drake_affetto.experiments.results.rates import (
+    NOT_EMPTY,
+    Position,
+    SuccessRate,
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class SchemeCell:
+    """One scheme with one number of samples.
+
+    Attributes:
+        success_rate: Success at the test positions.
+        per_repeat: Share of successes in each repeat.
+        rewards: Reward of each trial.
+    """
+
+    success_rate: SuccessRate
+    per_repeat: list[float] = field(default_factory=list)
+    rewards: list[float] = field(default_factory=list)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class SchemeComparisonRow:
+    """The paired test of two schemes.
+
+    Attributes:
+        a: First scheme.
+        b: Second scheme.
+        samples: Number of samples that both were given.
+        difference: Success rate of `a` minus that of `b`.
+        p: p value of "neither is better".
+        effect_size: Cohen's h.
+        p_corrected: p value, corrected for the number of comparisons.
+    """
+
+    a: str
+    b: str
+    samples: int
+    difference: float
+    p: float | None = None
+    effect_size: float | None = None
+    p_corrected: float | None
+
+
+@dataclasses.dataclass(frozen=True)
+class TransferMap:
+    """The map h of one repeat, on a grid.
+
+    Attributes:
+        scheme: Scheme that found the map.
+        samples: Number of samples that it was given.
+        input_names: Names of the two task parameters in the new view.
+        output_names: Names of the two task parameters in the old view.
+        shape: Shape of the grid.
+        input: Points of the grid.
+        output: Their images under h.
+        taught_input: Task parameters of the demonstrations.
+        taught_output: Their images under h.
+    """
+
+    scheme: str
+    samples: int
+    input_names: list[str]
+    output_names: list[str]
+    shape: list[int]
+    input: list[Position]
+    output: list[Position]
+    taught_input: list[Position]
+    taught_output: list[Position]
+
+    def check(self, where: str) -> None:
+        """Raises InputError where the lists do not fit the grid."""
+        points = int(np.prod(self.shape))
+        if len(self.shape) != 2 or not (
+            len(self.output) == points == len(self.input) > 0
+        ):
+            raise InputError(
+                f"{where} has {len(self.input)} inputs and "
+                f"{len(self.output)} outputs, expected a grid of {self.shape}"
+            )
+        for name in ("input_names", "output_names"):
+            if len(getattr(self, name)) != 2:
+                raise InputError(f"{where}.{name} has not two names")
+        if len(self.taught_input) != len(self.taught_output):
+            raise InputError(
+                f"{where} has taught inputs and outputs of several lengths"
+            )
+
+
+@dataclasses.dataclass(frozen=True)
+class MirrorResults:
+    """results.json of `affetto mirror`, for one changed view.
+
+    Attributes:
+        study: Kind of study, "mirror".
+        version: Version of the package that ran it.
+        seed: Seed of everything that is random.
+        scenario: Scenario of the changed view, by name or path.
+        samples: Numbers of demonstrations that the schemes were given.
+        repeats: Number of repeats.
+        evaluations: Number of test positions of a repeat.
+        demonstrations: Number of demonstrations in direct view.
+        choice: How the samples were chosen.
+        variability: Factor of the teacher's variation.
+        workspace: Share of the drum's region that was used.
+        schemes: Results by scheme and number of samples.
+        comparisons: Paired tests of the schemes.
+        map: The map of the first repeat; None if no scheme found one.
+    """
+
+    study: str
+    version: str
+    seed: int
+    scenario: str
+    samples: list[int] = field(metadata=NOT_EMPTY)
+    repeats: int
+    evaluations: int
+    demonstrations: int
+    choice: str
+    variability: float
+    workspace: float
+    schemes: dict[str, dict[int, SchemeCell]] = field(metadata=NOT_EMPTY)
+    comparisons: list[SchemeComparisonRow]
+    map: TransferMap | None = None
+
+    def check(self, where: str) -> None:
+        """Raises InputError where parts do not fit each other."""
+        for name, cells in self.schemes.items():
+            for samples in self.samples:
+                if samples not in cells:
+                    raise InputError(
+                        f"{where}schemes.{name} has nothing for {samples} "
+                        "samples"
+                    )
+        if self.map is not None:
+            self.map.check(f"{where}map")
+
+
+@dataclasses.dataclass(frozen=True)
+class ScenariosResults:
+    """results.json of `affetto mirror --all-scenarios`.
+
+    Attributes:
+        study: Kind of study, "scenarios".
+        version: Version of the package that ran it.
+        seed: Seed of everything that is random.
+        scenarios: Results by changed view.
+    """
+
+    study: str
+    version: str
+    seed: int
+    scenarios: dict[str, MirrorResults] = field(metadata=NOT_EMPTY)
+
+    def check(self, where: str) -> None:
+        """Raises InputError where parts do not fit each other."""
+        for name, each in self.scenarios.items():
+            each.check(f"{where}scenarios.{name}.")
+
+
+@dataclasses.dataclass(frozen=True)
+class ConditionRow:
+    """A scheme's success under one condition.
+
+    Attributes:
+        factor: What is changed.
+        value: What it is changed to.
+        scheme: Scheme.
+        samples: Number of samples that it was given.
+        success_rate: Success at the test positions.
+        per_repeat: Share of successes in each repeat.
+    """
+
+    factor: str
+    value: str
+    scheme: str
+    samples: int
+    success_rate: SuccessRate
+    per_repeat: list[float] = field(default_factory=list)
+
+
+@dataclasses.dataclass(frozen=True)
+class ConditionsResults:
+    """results.json of the study on when transfer wins.
+
+    Attributes:
+        study: Kind of study, "conditions".
+        version: Version of the package that ran it.
+        seed: Seed of everything that is random.
+        scenario: Scenario of the changed view.
+        repeats: Number of repeats.
+        evaluations: Number of test positions of a repeat.
+        conditions: Success by condition, scheme and number of samples.
+    """
+
+    study: str
+    version: str
+    seed: int
+    scenario: str
+    repeats: int
+    evaluations: int
+    conditions: list[ConditionRow] = field(metadata=NOT_EMPTY)
+
+    def check(self, where: str) -> None:
+        """All parts fit each other."""
