@@ -1,38 +1,21 @@
-"""`affetto identify`: fits the actuators to a robot's logs."""
+"""`affetto identify`: fits a joint's actuator to logs of the robot."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from drake_affetto.common.output import (
-    prepare_output,
-    write_json,
-    write_text_atomic,
-)
-from drake_affetto.identification.fit import (
-    JUDGED_FROM,
-    JointProblem,
-    JointSimulator,
-    estimate_uncertainty,
-)
-from drake_affetto.identification.prediction import (
-    _ACTUATOR_FILE,
-    _LAW_TOLERANCE,
-    _draw,
-    _fit,
-    _require_distinct,
-    _results,
-    _write_csv,
-    actuator_yaml,
-    predict,
-)
-from drake_affetto.pneumatics.parameters import load_parameters
-from drake_affetto.robot.log import (
-    law_mismatch,
-    load_stack,
-    read_log,
-    require_joint,
-)
+from drake_affetto.cli.options import add_output_argument
+from drake_affetto.common.errors import InputError
+from drake_affetto.common.output import prepare_output
+
+if TYPE_CHECKING:
+    from drake_affetto.identification.problem import JointProblem
+    from drake_affetto.robot.log import RobotLog
+
+# Rms difference to the robot's control law from which a log is remarked on,
+# kPa.
+_LAW_TOLERANCE = 2.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         required=True,
         metavar="LOG",
-        help="logs to predict, which the fit does not see",
+        help="logs to predict, which the fit does not use",
     )
     parser.add_argument(
         "--joint",
@@ -58,90 +41,107 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="number of the joint in the logs; 5 is the left elbow",
     )
-    parser.add_argument(
-        "--out", metavar="DIR", default="out/identify", help="where results go"
-    )
+    add_output_argument(parser, "out/identify")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fits, predicts and writes the results.
+    """Fits, predicts and writes the results; returns the exit code.
 
     Raises:
-        InputError: for a log, joint or folder that does not fit.
+        InputError: If a log, the joint or the folder does not fit.
     """
-    stack = load_stack()
-    joint = require_joint(stack, args.joint)
-    fit = [read_log(path, args.joint, stack) for path in args.fit]
-    test = [read_log(path, args.joint, stack) for path in args.test]
+    from rich.console import Console
+
+    from drake_affetto.identification.problem import JointProblem
+    from drake_affetto.identification.study import run_identification
+    from drake_affetto.pneumatics.parameters import load_parameters
+    from drake_affetto.robot.controller import (
+        load_robot_controller,
+        require_joint,
+    )
+    from drake_affetto.robot.log import read_log
+
+    # Everything is read and checked before the folder is made.
+    controller = load_robot_controller()
+    joint = require_joint(controller, args.joint)
+    fit = [read_log(path, args.joint, controller) for path in args.fit]
+    test = [read_log(path, args.joint, controller) for path in args.test]
     _require_distinct(args.fit, "--fit")
     _require_distinct(args.test, "--test")
     supply = load_parameters()
     problem = JointProblem(
         joint=joint,
-        stack=stack,
+        controller=controller,
         supply=supply,
         actuator=supply.classes[joint.actuator],
     )
     folder = prepare_output(args.out)
 
+    console = Console()
+    _print_notes(problem, fit, test)
+    results = run_identification(problem, fit, test, args.fit, folder, console)
+    _print_errors(results, console)
+    _print_parameters(results, console)
+    console.print(f"written to {folder}", highlight=False)
+    return 0
+
+
+def _require_distinct(paths: Sequence[str], option: str) -> None:
+    """Raises InputError if two logs have the same name."""
+    stems = [Path(path).stem for path in paths]
+    for stem in stems:
+        if stems.count(stem) > 1:
+            raise InputError(
+                f"{option}: two logs are called {stem}; their results would "
+                "overwrite each other"
+            )
+
+
+def _print_notes(
+    problem: "JointProblem",
+    fit: Sequence["RobotLog"],
+    test: Sequence["RobotLog"],
+) -> None:
+    """Prints what limits the use of these logs."""
+    from drake_affetto.robot.control_law import control_law_error
+
     for log in (*fit, *test):
-        mismatch = law_mismatch(log, joint, stack)
-        if mismatch > _LAW_TOLERANCE:
+        error = control_law_error(log, problem.joint, problem.controller)
+        if error > _LAW_TOLERANCE:
             print(
                 f"note: the commands of {log.name} are not those of the "
-                f"robot's PID law (rms difference {mismatch:.1f} kPa); expect "
+                f"robot's PID law (rms difference {error:.1f} kPa); expect "
                 "little of its closed loop"
             )
     both = {log.name for log in fit} & {log.name for log in test}
     if both:
         print(f"note: fitted and tested on: {', '.join(sorted(both))}")
 
-    state = _fit(problem, fit, args.fit, folder)
-    uncertainty = estimate_uncertainty(problem, fit, state)
-    simulator = JointSimulator(problem)
-    tested = [predict(simulator, state.values, log) for log in test]
-    fitted = [predict(simulator, state.values, log) for log in fit]
-    results = _results(problem, state, uncertainty, fitted, tested)
-    for prediction in tested:
-        stem = prediction.log.name
-        _write_csv(folder / f"{stem}_closed.csv", prediction.closed_loop)
-        _write_csv(folder / f"{stem}_open.csv", prediction.open_loop)
-    for prediction in (*fitted, *tested):
-        _draw(folder / f"{prediction.log.name}.png", prediction)
-    write_text_atomic(
-        folder / _ACTUATOR_FILE,
-        actuator_yaml(problem, state, uncertainty, [log.name for log in fit]),
-    )
-    # Last: where it is, everything is.
-    write_json(folder / "results.json", results)
-    _print_tables(results, folder)
-    return 0
 
-
-def _print_tables(results: dict[str, Any], folder: Path) -> None:
-    from rich.console import Console
+def _print_errors(results: dict[str, Any], console: Any) -> None:
     from rich.table import Table
 
-    console = Console()
     table = Table(
-        title=f"{results['joint']}: errors from {JUDGED_FROM:g} s on (rms)"
+        title=f"{results['joint']}: errors from "
+        f"{results['judged_from_s']:g} s on (rms)"
     )
     for head in ("log", "used for", "loop", "q [%]", "p_a [kPa]", "p_b [kPa]"):
         table.add_column(head)
-    for use in ("fit", "test"):
-        for name in results[use]:
-            entry = results["logs"][name]
-            for loop in ("closed", "open"):
-                rms = entry[f"{loop}_loop"]
-                table.add_row(
-                    name, use, loop, *(f"{x:.2f}" for x in rms.values())
-                )
-    for loop in ("closed", "open"):
-        rms = results[f"{loop}_loop"]
-        table.add_row(
-            "all tests", "test", loop, *(f"{x:.2f}" for x in rms.values())
-        )
+    rows = [
+        (name, use, results["logs"][name])
+        for use in ("fit", "test")
+        for name in results[use]
+    ]
+    for name, use, entry in [*rows, ("all tests", "test", results)]:
+        for loop in ("closed", "open"):
+            errors = entry[f"{loop}_loop"].values()
+            table.add_row(name, use, loop, *(f"{x:.2f}" for x in errors))
     console.print(table)
+
+
+def _print_parameters(results: dict[str, Any], console: Any) -> None:
+    from rich.table import Table
+
     table = Table(title="parameters")
     for head in ("name", "value", "±", "unit", ""):
         table.add_column(head)
@@ -155,4 +155,3 @@ def _print_tables(results: dict[str, Any], folder: Path) -> None:
             "" if entry["determined"] else "not determined",
         )
     console.print(table)
-    console.print(f"written to {folder}", highlight=False)

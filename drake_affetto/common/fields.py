@@ -73,6 +73,10 @@ def check_ranges(obj: Any, where: str = "") -> None:
         name = f"{where}.{field.name}" if where else field.name
         if dataclasses.is_dataclass(value):
             check_ranges(value, name)
+        elif isinstance(value, list):
+            for i, each in enumerate(value):
+                if dataclasses.is_dataclass(each):
+                    check_ranges(each, f"{name}[{i}]")
         if "range" not in field.metadata:
             continue
         if field.metadata["help"]:

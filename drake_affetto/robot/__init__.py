@@ -1,1 +1,1 @@
-"""The real robot: its logs."""
+"""The real robot: its logs and its own controller."""

@@ -1,149 +1,76 @@
-"""Logs of the robot's own library, and the control law that made them.
+"""Logs of the robot's own library.
 
-Here alone live the robot's units: percent of a joint's range, kPa gauge, and
-commands of 0..255. What leaves this module is in rad and Pa absolute.
+They are in the robot's units: percent of a joint's range, kPa gauge, and
+commands of 0..255.
 """
 
 import dataclasses
-import math
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drake_affetto.common.csv_columns import read_columns
-from drake_affetto.common.errors import InputError, require, require_range
+from drake_affetto.common.errors import InputError
+from drake_affetto.common.typing import Array
+from drake_affetto.robot.controller import RobotController
 
-PID_FILE = "package://drake_affetto/robot_pid.yaml"
+# The greatest command on the wire.
 COMMAND_MAXIMUM = 255.0
-"""The greatest command on the wire."""
-
-
-@dataclasses.dataclass
-class RobotJoint:
-    """One joint of the robot as its own library drives it.
-
-    Args:
-        name: the joint's name in the robot's model.
-        actuator: its actuator class.
-        range_degrees: what 0 to 100 % stand for.
-        kP: kPa per %.
-        kD: kPa per %/s.
-        kI: kPa per % and sample.
-    """
-
-    name: str = ""
-    actuator: str = ""
-    range_degrees: float = 90.0
-    kP: float = 0.0
-    kD: float = 0.0
-    kI: float = 0.0
-
-
-@dataclasses.dataclass
-class RobotStack:
-    """The robot's control stack.
-
-    Args:
-        control_rate: of commands and log rows, Hz.
-        sensor_rate: of the sensors and their filter, Hz.
-        filter_order: order of the Butterworth filter of the angle.
-        filter_cutoff: its cut-off, Hz.
-        stiffness: command of both chambers at u = 0, kPa gauge.
-        command_maximum: pressure of the greatest command, kPa gauge.
-        joints: the joints, in the order of the log's columns.
-    """
-
-    control_rate: float = 30.0
-    sensor_rate: float = 100.0
-    filter_order: int = 5
-    filter_cutoff: float = 10.0
-    stiffness: float = 400.0
-    command_maximum: float = 600.0
-    joints: list[RobotJoint] = dataclasses.field(default_factory=list)
-
-    def check(self, where: str) -> None:
-        """Raises InputError naming the first field that does not fit."""
-        require_range(f"{where}.control_rate", self.control_rate, 1.0, 1e3)
-        require_range(f"{where}.sensor_rate", self.sensor_rate, 1.0, 1e3)
-        require_range(f"{where}.filter_order", self.filter_order, 1, 8)
-        require_range(
-            f"{where}.filter_cutoff",
-            self.filter_cutoff,
-            0.1,
-            0.499 * self.sensor_rate,
-        )
-        require_range(f"{where}.command_maximum", self.command_maximum, 1.0)
-        for i, joint in enumerate(self.joints):
-            require_range(
-                f"{where}.joints[{i}].range_degrees",
-                joint.range_degrees,
-                1.0,
-                360.0,
-            )
-
-
-def load_stack(file: str | Path = PID_FILE) -> RobotStack:
-    """Reads the robot's control stack from YAML.
-
-    Raises:
-        InputError: for a file or a value that does not fit, by name.
-    """
-    # Drake's YAML reader is behind this; the mathematics need none of it.
-    from drake_affetto.common.yaml_config import load_config
-
-    return load_config(RobotStack, file)
 
 
 @dataclasses.dataclass(frozen=True)
 class RobotLog:
-    """One joint's part of a log, N rows; percent and kPa gauge as logged.
+    """One joint's part of a log; arrays have a value for each of N rows.
 
     Attributes:
-        name: the file's stem.
-        joint: the joint's number in the log.
-        t: time, s.
-        q: raw joint angle, % of range.
-        p_a: raw pressure of chamber a, kPa gauge.
-        p_b: of chamber b.
-        c_a: commanded pressure of chamber a, kPa gauge.
-        c_b: of chamber b.
-        q_des: reference angle, %.
-        dq_des: its rate, %/s.
-        q_filtered: what the robot's controller took for the angle, %.
-        dq_filtered: and for its rate, %/s.
+        name: Name of the file, without its suffix.
+        joint: Number of the joint in the log.
+        t: Time from the first row, s.
+        q: Raw joint angle, % of the range.
+        p_a: Raw pressure of chamber a, kPa gauge.
+        p_b: Raw pressure of chamber b, kPa gauge.
+        c_a: Commanded pressure of chamber a, kPa gauge.
+        c_b: Commanded pressure of chamber b, kPa gauge.
+        q_des: Reference angle, %.
+        dq_des: Reference velocity, %/s.
+        q_filtered: Angle that the robot's controller used, %.
+        dq_filtered: Velocity that the robot's controller used, %/s.
     """
 
     name: str
     joint: int
-    t: NDArray[np.float64]
-    q: NDArray[np.float64]
-    p_a: NDArray[np.float64]
-    p_b: NDArray[np.float64]
-    c_a: NDArray[np.float64]
-    c_b: NDArray[np.float64]
-    q_des: NDArray[np.float64]
-    dq_des: NDArray[np.float64]
-    q_filtered: NDArray[np.float64]
-    dq_filtered: NDArray[np.float64]
+    t: Array
+    q: Array
+    p_a: Array
+    p_b: Array
+    c_a: Array
+    c_b: Array
+    q_des: Array
+    dq_des: Array
+    q_filtered: Array
+    dq_filtered: Array
 
 
 def read_log(
-    path: str | Path, joint: int, stack: RobotStack, *, driven: bool = True
+    path: str | Path,
+    joint: int,
+    controller: RobotController,
+    *,
+    driven: bool = True,
 ) -> RobotLog:
     """Reads one joint from a CSV log of the robot.
 
-    Columns needed (k is the joint): t, rqk, rpak, rpbk, cak, cbk, qdesk. Used
-    where they are there: dqdesk, qk, dqk.
+    Required columns (k is the joint): t, rqk, rpak, rpbk, cak, cbk, qdesk.
+    Optional columns: dqdesk, qk, dqk.
 
     Args:
-        path: the CSV file.
-        joint: number of the joint.
-        stack: scales of the commands.
-        driven: whether to refuse a log in which the joint was not driven.
+        path: The CSV file.
+        joint: Number of the joint.
+        controller: The robot's controller, which has the scale of commands.
+        driven: Whether to refuse a log in which the joint was not driven.
 
     Raises:
-        InputError: naming the file and what is wrong with it.
+        InputError: If the file is not such a log; it names file and fault.
     """
     path = Path(path)
     data = read_columns(
@@ -174,7 +101,7 @@ def read_log(
         raise InputError(
             f"{path}: {t[-1] - t[0]:.2f} s long, at least 2 s are needed"
         )
-    scale = stack.command_maximum / COMMAND_MAXIMUM
+    scale = controller.command_maximum / COMMAND_MAXIMUM
     q = data[f"rq{joint}"]
     q_des = data[f"qdes{joint}"]
     log = RobotLog(
@@ -209,48 +136,3 @@ def _require_driven(path: Path, log: RobotLog) -> None:
             f"{path}: joint {log.joint} moves, but its commands do not "
             f"({swing:.1f} kPa): a recording led by hand?"
         )
-
-
-def initial_sum(log: RobotLog, joint: RobotJoint, stack: RobotStack) -> float:
-    """Σe with which the controller came into the log, % samples.
-
-    It is a state of the controller before the log begins (a run carries on
-    the sum of the one before), read off the first row's command.
-    """
-    if joint.kI == 0.0:
-        return 0.0
-    error = log.q_des[0] - log.q_filtered[0]
-    u = log.c_a[0] - stack.stiffness
-    rest = u - joint.kP * error
-    rest -= joint.kD * (log.dq_des[0] - log.dq_filtered[0])
-    carried = rest / joint.kI - error
-    return carried if math.isfinite(carried) else 0.0
-
-
-def law_mismatch(log: RobotLog, joint: RobotJoint, stack: RobotStack) -> float:
-    """Root mean square by which the log's commands differ from the law, kPa.
-
-    Near zero where the log was made with these gains; where it is not, a
-    simulation in closed loop with them is not the robot's.
-    """
-    error = log.q_des - log.q_filtered
-    total = initial_sum(log, joint, stack) + np.cumsum(error)
-    u = joint.kP * error + joint.kD * (log.dq_des - log.dq_filtered)
-    u += joint.kI * total
-    command = np.clip(stack.stiffness + u, 0.0, stack.command_maximum)
-    return float(np.sqrt(np.mean((command - log.c_a) ** 2)))
-
-
-def require_joint(stack: RobotStack, joint: int) -> RobotJoint:
-    """The joint with that number.
-
-    Raises:
-        InputError: if the stack has no such joint.
-    """
-    require(
-        0 <= joint < len(stack.joints),
-        "joint",
-        joint,
-        f"a number from 0 to {len(stack.joints) - 1}",
-    )
-    return stack.joints[joint]

@@ -4,25 +4,24 @@ import dataclasses
 
 import numpy as np
 
-from drake_affetto.identification.fit import (
-    JointProblem,
-    JointSimulator,
-)
+from drake_affetto.identification.problem import JointProblem
+from drake_affetto.identification.simulator import JointSimulator
 from drake_affetto.pneumatics.parameters import (
     ActuatorClass,
     PneumaticParameters,
 )
-from drake_affetto.robot.log import RobotLog, load_stack
+from drake_affetto.robot.controller import load_robot_controller
+from drake_affetto.robot.log import RobotLog
 
 JOINT = 5
-STACK = load_stack()
+CONTROLLER = load_robot_controller()
 
 
 def make_problem():
     """The left elbow's problem, apart from the default actuators."""
     return JointProblem(
-        joint=STACK.joints[JOINT],
-        stack=STACK,
+        joint=CONTROLLER.joints[JOINT],
+        controller=CONTROLLER,
         supply=PneumaticParameters(),
         actuator=ActuatorClass(),
     )

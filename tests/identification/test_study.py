@@ -9,20 +9,27 @@ import pytest
 
 from drake_affetto.cli import identify as command
 from drake_affetto.common.errors import InputError
-from drake_affetto.identification import fit as identification
-from drake_affetto.identification import prediction as identify
-from drake_affetto.pneumatics.parameters import load_parameters
+from drake_affetto.identification import fit, study, uncertainty
+from drake_affetto.identification.problem import JointProblem
+from drake_affetto.pneumatics.parameters import (
+    ActuatorClass,
+    JointActuator,
+    PneumaticParameters,
+    load_parameters,
+)
+from drake_affetto.robot.controller import RobotController, RobotJoint
 from support.robot_bench import make_log, make_problem, true_values, write_csv
 
 
 @pytest.fixture
 def logs(tmp_path, monkeypatch):
     """Three short logs, and a fit that does not take long."""
-    for module in (identification, identify):
-        monkeypatch.setattr(module, "STAGES", ("windows", "runs"))
+    for module in (fit, study):
+        monkeypatch.setattr(module, "FIT_STAGES", ("windows", "runs"))
+    for module in (uncertainty, study):
         monkeypatch.setattr(module, "PROFILED", ("inertia",))
-    monkeypatch.setattr(identification, "_EVALUATIONS", (3, 3))
-    monkeypatch.setattr(identification, "_PROFILE_EVALUATIONS", 1)
+    monkeypatch.setattr(fit, "_EVALUATIONS", (3, 3))
+    monkeypatch.setattr(uncertainty, "_PROFILE_EVALUATIONS", 1)
     problem = make_problem()
     values = true_values(problem)
     return [
@@ -142,3 +149,21 @@ def test_logs_of_other_gains_are_remarked_on(tmp_path, logs, capsys):
     other.write_text("\n".join(",".join(r) for r in [names, *rows]) + "\n")
     run("--fit", logs[0], "--test", other, "--out", tmp_path / "out")
     assert "not those of the robot's PID law" in capsys.readouterr().out
+
+
+def test_the_key_of_a_stored_fit_stays(tmp_path, monkeypatch):
+    monkeypatch.setattr(study, "__version__", "0.1.0")
+    path = tmp_path / "run.csv"
+    path.write_text("t,q\n")
+    problem = JointProblem(
+        joint=RobotJoint(name="elbow", actuator="arm", kP=2.0),
+        controller=RobotController(joints=[RobotJoint(name="elbow")]),
+        supply=PneumaticParameters(
+            classes={"arm": ActuatorClass()},
+            joints={"elbow": JointActuator(actuator="arm")},
+        ),
+        actuator=ActuatorClass(),
+    )
+    assert study.fit_key(problem, [str(path)]) == (
+        "db4cb326fe74a4711d6869a92b1e6e706944c82b573f7219ff3801adfe9d0101"
+    )

@@ -1,0 +1,197 @@
+"""An identification study: a fit that continues after a kill, and its files."""
+
+from collections.abc import Sequence
+import dataclasses
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from drake_affetto import __version__
+from drake_affetto.common.folder_lock import lock_folder
+from drake_affetto.common.output import write_json, write_text_atomic
+from drake_affetto.identification.fit import FIT_STAGES, FitState, fit_logs
+from drake_affetto.identification.plots import draw_prediction
+from drake_affetto.identification.prediction import predict
+from drake_affetto.identification.problem import JointProblem
+from drake_affetto.identification.results import (
+    actuator_yaml,
+    make_results,
+    write_csv,
+)
+from drake_affetto.identification.simulator import ANGLE_SCALE, JointSimulator
+from drake_affetto.identification.uncertainty import (
+    PROFILED,
+    estimate_uncertainty,
+    profile_fit,
+)
+from drake_affetto.robot.log import RobotLog
+
+_STATE_FILE = "state.json"
+_ACTUATOR_FILE = "actuator.yaml"
+# Increased when a change of the model makes a stored state worthless.
+_STATE_VERSION = 1
+
+
+def fit_key(problem: JointProblem, paths: Sequence[str]) -> str:
+    """The digest of everything that determines a fit.
+
+    It is stored beside the fit's state; its names stay as they are, so that
+    a stored fit continues.
+    """
+    parts: list[Any] = [
+        _STATE_VERSION,
+        __version__,
+        {
+            "joint": dataclasses.asdict(problem.joint),
+            "stack": dataclasses.asdict(problem.controller),
+            "supply": dataclasses.asdict(problem.supply),
+            "actuator": dataclasses.asdict(problem.actuator),
+        },
+        [dataclasses.astuple(p) for p in problem.parameters()],
+    ]
+    digest = hashlib.sha256(json.dumps(parts, sort_keys=True).encode())
+    for path in paths:
+        digest.update(Path(path).name.encode())
+        digest.update(Path(path).read_bytes())
+    return digest.hexdigest()
+
+
+def read_state(path: Path, key: str) -> FitState | None:
+    """The state of an interrupted fit; None if it is that of another fit."""
+    try:
+        stored = json.loads(path.read_text(encoding="utf-8"))
+        if stored["key"] != key:
+            return None
+        return FitState(**stored["state"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _fit(
+    problem: JointProblem,
+    logs: Sequence[RobotLog],
+    paths: Sequence[str],
+    folder: Path,
+    console: Any,
+) -> FitState:
+    """Fits with a progress display, from where a former run stopped."""
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+    )
+
+    total = len(FIT_STAGES) + len(PROFILED)
+    key = fit_key(problem, paths)
+    state = read_state(folder / _STATE_FILE, key)
+    done = 0 if state is None else state.stage + len(state.profile)
+    if state is not None:
+        console.print(
+            f"found {done} of {total} stages done in {folder}, going on from "
+            "there",
+            highlight=False,
+            soft_wrap=True,
+        )
+    progress = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[note]}"),
+        TimeElapsedColumn(),
+        console=console,
+    )
+    task = progress.add_task("fitting", total=total, completed=done, note="")
+    lowest = float("inf")
+
+    def on_evaluation(stage: int, cost: float) -> None:
+        nonlocal lowest
+        lowest = min(lowest, cost)
+        progress.update(
+            task,
+            description=f"fitting to {FIT_STAGES[stage]}",
+            note=f"error {ANGLE_SCALE * lowest**0.5:.2f} % of range",
+        )
+
+    def on_profile(name: str, ratio: float) -> None:
+        progress.update(
+            task,
+            description=f"varying {name}",
+            note=f"squared error x {ratio:.2f}",
+        )
+
+    def on_stage(reached: FitState) -> None:
+        nonlocal lowest
+        lowest = float("inf")
+        write_json(
+            folder / _STATE_FILE,
+            {"key": key, "state": dataclasses.asdict(reached)},
+        )
+        progress.update(task, completed=reached.stage + len(reached.profile))
+
+    with progress:
+        state = fit_logs(
+            problem,
+            logs,
+            state=state,
+            on_evaluation=on_evaluation,
+            on_stage=on_stage,
+        )
+        return profile_fit(
+            problem,
+            logs,
+            state,
+            on_evaluation=on_profile,
+            on_parameter=on_stage,
+        )
+
+
+def run_identification(
+    problem: JointProblem,
+    fit: Sequence[RobotLog],
+    test: Sequence[RobotLog],
+    paths: Sequence[str],
+    folder: Path,
+    console: Any,
+) -> dict[str, Any]:
+    """Fits the joint to logs, predicts others, and writes the results.
+
+    Args:
+        problem: The joint to be identified.
+        fit: Logs to fit to.
+        test: Logs to predict.
+        paths: Files of the logs `fit`, which are a part of the fit's key.
+        folder: Folder of the results.
+        console: A rich console for progress.
+
+    Returns:
+        The content of results.json.
+
+    Raises:
+        InputError: If a file cannot be written, or another process works in
+            the folder.
+    """
+    with lock_folder(folder, "affetto identify"):
+        # The fit, and both loops of each log under the fitted values.
+        state = _fit(problem, fit, paths, folder, console)
+        uncertainty = estimate_uncertainty(problem, fit, state)
+        simulator = JointSimulator(problem)
+        tested = [predict(simulator, state.values, log) for log in test]
+        fitted = [predict(simulator, state.values, log) for log in fit]
+        results = make_results(problem, state, uncertainty, fitted, tested)
+        # The files.
+        for prediction in tested:
+            stem = prediction.log.name
+            write_csv(folder / f"{stem}_closed.csv", prediction.closed_loop)
+            write_csv(folder / f"{stem}_open.csv", prediction.open_loop)
+        for prediction in (*fitted, *tested):
+            draw_prediction(folder / f"{prediction.log.name}.png", prediction)
+        write_text_atomic(
+            folder / _ACTUATOR_FILE,
+            actuator_yaml(
+                problem, state, uncertainty, [log.name for log in fit]
+            ),
+        )
+        # Last: where results.json is, all the rest is.
+        write_json(folder / "results.json", results)
+    return results
