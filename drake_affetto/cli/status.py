@@ -56,16 +56,16 @@ def rate(finished_at: list[str]) -> float | None:
 def _print(folder: Path, store: "TrialStore", console: Any) -> None:
     from rich.table import Table
 
-    stages = store.stages()
+    phases = store.phases()
     table = Table(title=str(folder))
-    for name in ("stage", "done", "of", ""):
-        table.add_column(name, justify="left" if name == "stage" else "right")
-    for stage in stages:
+    for name in ("phase", "done", "of", ""):
+        table.add_column(name, justify="left" if name == "phase" else "right")
+    for phase in phases:
         table.add_row(
-            stage.label,
-            str(stage.done),
-            str(stage.total),
-            f"{stage.done / max(stage.total, 1):.0%}",
+            phase.label,
+            str(phase.done),
+            str(phase.total),
+            f"{phase.done / max(phase.total, 1):.0%}",
         )
     console.print(table)
     times = store.finished_at()
@@ -73,7 +73,7 @@ def _print(folder: Path, store: "TrialStore", console: Any) -> None:
     if times:
         ago = datetime.now(UTC) - datetime.fromisoformat(times[-1])
         text += f", the last {_duration(ago.total_seconds())} ago"
-    left = sum(stage.total - stage.done for stage in stages)
+    left = sum(phase.total - phase.done for phase in phases)
     speed = rate(times)
     if left:
         text += f"; {left} are planned and not finished"

@@ -22,6 +22,7 @@ import typing
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.nested import map_leaves
 
 T = TypeVar("T")
 
@@ -40,20 +41,18 @@ def to_plain(value: Any) -> Any:
         value: A dataclass, or a nest of dataclasses, mappings, sequences,
             numpy arrays and scalars.
     """
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {
-            field.name: to_plain(getattr(value, field.name))
-            for field in dataclasses.fields(value)
-        }
-    if isinstance(value, Mapping):
-        return {str(key): to_plain(each) for key, each in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [to_plain(each) for each in value]
-    if hasattr(value, "tolist"):
-        return to_plain(value.tolist())
-    if isinstance(value, os.PathLike):
-        return os.fspath(value)
-    return value
+
+    def leaf(value: Any) -> Any:
+        if dataclasses.is_dataclass(value) and not isinstance(value, type):
+            fields = dataclasses.fields(value)
+            return to_plain({f.name: getattr(value, f.name) for f in fields})
+        if hasattr(value, "tolist"):
+            return to_plain(value.tolist())
+        if isinstance(value, os.PathLike):
+            return os.fspath(value)
+        return value
+
+    return map_leaves(value, leaf)
 
 
 def from_plain(kind: type[T], value: Any, where: str = "") -> T:

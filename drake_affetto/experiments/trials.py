@@ -12,17 +12,21 @@ rest determines the trial, including seeds. The kinds are
 and `drake_affetto.experiments.results` has the result of each.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 import dataclasses
 import functools
-import hashlib
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from drake_affetto import __version__
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.fingerprint import (
+    config_values,
+    files_digest,
+    text_digest,
+)
+from drake_affetto.common.nested import leaves
 from drake_affetto.common.resources import models_dir, resolve
 from drake_affetto.experiments.episode import (
     GuidedMovement,
@@ -67,7 +71,7 @@ def models_digest() -> str:
     root = models_dir()
     # The other YAML files count where a scenario names them.
     suffixes = (".sdf", ".obj", ".xml", ".dmd.yaml")
-    return _digest_of_files(
+    return files_digest(
         path
         for path in sorted(root.rglob("*"))
         if path.is_file() and path.name.endswith(suffixes)
@@ -79,58 +83,23 @@ def software() -> dict[str, str]:
     return {"version": __version__, "models": models_digest()}
 
 
-def _digest_of_files(paths: Iterable[Path]) -> str:
-    digest = hashlib.sha256()
-    for path in paths:
-        digest.update(path.name.encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
 @functools.cache
 def _fingerprint(scenario: str) -> dict[str, str]:
     """What, besides its own numbers, determines a trial of a scenario."""
-    loaded = _plain(load_scenario(scenario))
+    loaded = config_values(load_scenario(scenario))
     for name in _LEARNING:
         del loaded[name]
     return {
         "name": scenario,
-        "values": hashlib.sha256(repr(loaded).encode()).hexdigest()[:16],
-        "files": _digest_of_files(
-            resolve(text)
-            for text in _texts(loaded)
-            if text.endswith((".yaml", ".yml"))
+        "values": text_digest(repr(loaded)),
+        "files": files_digest(
+            resolve(leaf)
+            for leaf in leaves(loaded)
+            if isinstance(leaf, str) and leaf.endswith((".yaml", ".yml"))
         ),
         "models": models_digest(),
         "version": __version__,
     }
-
-
-def _texts(value: Any) -> Iterator[str]:
-    """All texts in a nest of mappings and sequences."""
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, Mapping):
-        for each in value.values():
-            yield from _texts(each)
-    elif isinstance(value, (list, tuple)):
-        for each in value:
-            yield from _texts(each)
-
-
-def _plain(value: Any) -> Any:
-    """The values of a configuration, Drake's own structs included."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        fields: Sequence[Any] = dataclasses.fields(value)
-    else:
-        fields = getattr(value, "__fields__", ())
-    if fields:
-        return {f.name: _plain(getattr(value, f.name)) for f in fields}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, Mapping):
-        return {k: _plain(v) for k, v in value.items()}
-    return value
 
 
 def _spec(kind: str, scenario: str, **rest: Any) -> Spec:

@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 import dataclasses
-import hashlib
 import json
 from pathlib import Path
 from typing import Any
 
 from drake_affetto import __version__
+from drake_affetto.common.fingerprint import files_digest
 from drake_affetto.common.folder_lock import lock_folder
 from drake_affetto.common.output import write_json, write_text_atomic
 from drake_affetto.identification.fit import FIT_STAGES, FitState, fit_logs
@@ -50,11 +50,8 @@ def fit_key(problem: JointProblem, paths: Sequence[str]) -> str:
         },
         [dataclasses.astuple(p) for p in problem.parameters()],
     ]
-    digest = hashlib.sha256(json.dumps(parts, sort_keys=True).encode())
-    for path in paths:
-        digest.update(Path(path).name.encode())
-        digest.update(Path(path).read_bytes())
-    return digest.hexdigest()
+    text = json.dumps(parts, sort_keys=True)
+    return files_digest(paths, text=text, length=None)
 
 
 def read_state(path: Path, key: str) -> FitState | None:

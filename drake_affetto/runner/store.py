@@ -7,7 +7,6 @@ same trials join to a whole by copying rows.
 
 from collections.abc import Mapping, Sequence
 import dataclasses
-import hashlib
 import io
 import json
 from pathlib import Path
@@ -18,6 +17,8 @@ import joblib
 import numpy as np
 
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.fingerprint import text_digest
+from drake_affetto.common.nested import map_leaves
 
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS trials (
@@ -38,24 +39,24 @@ CREATE TABLE IF NOT EXISTS plans (
 """
 
 
-def _plain(value: Any) -> Any:
-    """What stands for `value` in a key and in the readable spec."""
-    if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, (np.floating, np.integer, np.bool_)):
-        return value.item()
-    if value is None or isinstance(value, (str, int, float, bool)):
-        return value
-    # Arrays, estimators: their content's digest.
-    return f"{type(value).__name__}:{joblib.hash(value)}"
+def _key_values(value: Any) -> Any:
+    """The plain data that stand for `value` in a key and a stored spec."""
+
+    def leaf(value: Any) -> Any:
+        if isinstance(value, (np.floating, np.integer, np.bool_)):
+            return value.item()
+        if value is None or isinstance(value, (str, int, float, bool)):
+            return value
+        # Arrays, estimators: the digest of their content.
+        return f"{type(value).__name__}:{joblib.hash(value)}"
+
+    return map_leaves(value, leaf)
 
 
 def trial_key(spec: Mapping[str, Any]) -> str:
     """The key of the trial that `spec` determines."""
-    text = json.dumps(_plain(spec), sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()
+    text = json.dumps(_key_values(spec), sort_keys=True)
+    return text_digest(text, length=None)
 
 
 def pack_arrays(arrays: Mapping[str, np.ndarray]) -> bytes:
@@ -72,13 +73,13 @@ def unpack_arrays(data: bytes) -> dict[str, np.ndarray]:
 
 
 @dataclasses.dataclass(frozen=True)
-class Stage:
-    """How far one stage of a study has come.
+class Phase:
+    """The progress of one phase of a study.
 
     Attributes:
-        label: what it is called.
-        total: how many trials it consists of.
-        done: how many of them are finished.
+        label: Name of the phase.
+        total: Number of its trials.
+        done: Number of its finished trials.
     """
 
     label: str
@@ -99,11 +100,12 @@ class TrialStore:
         """Opens or makes the file.
 
         Args:
-            path: of the file.
-            read_only: to look at one that is there, also while it is written.
+            path: Path of the file.
+            read_only: Whether to only read an existing file, which another
+                process may be writing.
 
         Raises:
-            InputError: if it cannot be written or is not such a file.
+            InputError: If it cannot be written or is not such a file.
         """
         self.path = Path(path)
         try:
@@ -155,8 +157,8 @@ class TrialStore:
                     (
                         trial_key(spec),
                         str(spec.get("kind", "")),
-                        json.dumps(_plain(spec), sort_keys=True),
-                        json.dumps(_plain(result), allow_nan=False),
+                        json.dumps(_key_values(spec), sort_keys=True),
+                        json.dumps(_key_values(result), allow_nan=False),
                         pack_arrays(arrays),
                     ),
                 )
@@ -167,7 +169,7 @@ class TrialStore:
             ) from error
 
     def plan(self, label: str, specs: Sequence[Mapping[str, Any]]) -> None:
-        """Keeps what a stage consists of, for `stages` to count.
+        """Stores the trials of a phase, for `phases` to count.
 
         Raises:
             InputError: if it cannot be written.
@@ -181,14 +183,14 @@ class TrialStore:
         except sqlite3.Error as error:
             raise InputError(f"cannot write to {self.path}: {error}") from error
 
-    def stages(self) -> list[Stage]:
-        """The stages planned so far, in their order."""
+    def phases(self) -> list[Phase]:
+        """The phases planned so far, in their order."""
         rows = self._db.execute(
             "SELECT label, COUNT(*), COUNT(trials.key) FROM plans "
             "LEFT JOIN trials USING (key) GROUP BY label ORDER BY "
             "MIN(plans.rowid)"
         )
-        return [Stage(*row) for row in rows]
+        return [Phase(*row) for row in rows]
 
     def merge(self, path: str | Path) -> int:
         """Takes over the finished trials of another study's file.

@@ -6,7 +6,6 @@ killed continues from there.
 """
 
 import dataclasses
-import hashlib
 import itertools
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from optuna.trial import TrialState
 
 from drake_affetto import __version__
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.fingerprint import text_digest
 from drake_affetto.common.folder_lock import lock_folder
 from drake_affetto.common.output import write_json, write_text_atomic
 from drake_affetto.common.typed_json import to_plain
@@ -72,7 +72,7 @@ def fingerprint(plan: TunePlan) -> str:
         actuators,
         np.stack([robot.space.start, robot.lower, robot.upper]).tolist(),
     )
-    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+    return text_digest(repr(parts))
 
 
 def _prepare_study(

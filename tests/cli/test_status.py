@@ -12,23 +12,23 @@ import pytest
 from drake_affetto.cli.main import main
 from drake_affetto.cli.status import rate
 from drake_affetto.common.errors import InputError
-from drake_affetto.runner.store import Stage, TrialStore
+from drake_affetto.runner.store import Phase, TrialStore
 
 
 def spec(i):
     return {"kind": "k", "i": i}
 
 
-def test_stages_are_counted_by_what_is_finished(tmp_path, capsys):
+def test_phases_are_counted_by_what_is_finished(tmp_path, capsys):
     with TrialStore(tmp_path / "trials.sqlite") as store:
         store.plan("teaching", [spec(i) for i in range(3)])
         for i in range(4):
             store.put(spec(i), {}, {})
-        # A trial may belong to two stages, and twice to one.
+        # A trial may belong to two phases, and twice to one.
         store.plan("drumming", [spec(i) for i in (2, 3, 4, 5, 5)])
-        assert store.stages() == [
-            Stage("teaching", 3, 3),
-            Stage("drumming", 4, 2),
+        assert store.phases() == [
+            Phase("teaching", 3, 3),
+            Phase("drumming", 4, 2),
         ]
         # While it is written to.
         assert main(["status", str(tmp_path)]) == 0

@@ -103,3 +103,16 @@ def test_a_kill_loses_no_finished_trial(tmp_path):
             result, arrays = store.get(spec(i))
             assert result == {"reward": i}
             assert np.all(arrays["x"] == i)
+
+
+def test_the_key_of_a_stored_trial_stays():
+    spec = {
+        "kind": "x",
+        "a": np.float64(1.5),
+        "b": np.arange(3.0),
+        "c": (1, None, True),
+        "d": {1: np.int64(2)},
+    }
+    assert trial_key(spec) == (
+        "f700a687dc0e16f86d4a174c26a69ac54d701540ede2fc8d6672322fa4c69835"
+    )

@@ -1,6 +1,5 @@
 """The tuning study, small and short but real: on the whole robot."""
 
-import hashlib
 import json
 import os
 from pathlib import Path
@@ -19,6 +18,7 @@ import pytest
 
 from drake_affetto.cli.main import main
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.fingerprint import text_digest
 from drake_affetto.common.folder_lock import lock_folder
 from drake_affetto.common.typed_json import from_plain, to_plain
 from drake_affetto.control.pidf import (
@@ -349,10 +349,7 @@ def test_the_text_of_the_fingerprint_stays():
             joints={"joint": JointActuator(actuator="elbow")},
         ),
     )
-    digests = [
-        hashlib.sha256(repr(part).encode()).hexdigest()[:16] for part in parts
-    ]
-    assert digests == [
+    assert [text_digest(repr(part)) for part in parts] == [
         "b8722c8c7cf2de6a",
         "986d15f3684b9261",
         "88fdc912f428f29a",
