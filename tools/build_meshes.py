@@ -1,7 +1,7 @@
 """Writes the meshes of Affetto and its drum beside this file.
 
 Needs numpy alone. Every mesh is a smooth surface swept along a path or
-deformed from a ball, in the frame of the link that carries it, in metres;
+deformed from a ball, in the frame of the link that carries it, in meters;
 link lengths are those of `sdf/affetto.sdf`. Run it again after a change:
 
     python tools/build_meshes.py
@@ -132,7 +132,7 @@ def sweep(
     """A tube with rounded ends through elliptic stations.
 
     Args:
-        stations: rows (x, y, z, a, b): centre and half widths, a along
+        stations: rows (x, y, z, a, b): center and half widths, a along
             `side` × path and b along `side`.
         power: of the super-ellipse; 2 is an ellipse, more is squarer.
         ends: how far each rounded end bulges out, in multiples of its mean
@@ -157,9 +157,9 @@ def sweep(
             x, y, z, a, b = middle[index]
             sign = -1 if end == 0 else 1
             bulge = sign * ends[end] * 0.5 * (a + b) * np.sin(turn)
-            centre = middle[index, :3] + bulge * path[index]
+            center = middle[index, :3] + bulge * path[index]
             shrink = np.cos(turn) if turn < np.pi / 2 else 0.0
-            out.append((*centre, a * shrink, b * shrink, path[index]))
+            out.append((*center, a * shrink, b * shrink, path[index]))
     phi = np.linspace(0, 2 * np.pi, around, endpoint=False)
     c, s = np.cos(phi), np.sin(phi)
     u = np.sign(c) * np.abs(c) ** (2 / power)
@@ -211,7 +211,7 @@ def _bump(d: Array, at, width: float, height: float) -> Array:
 
 
 def head_radius(d: Array) -> Array:
-    """Distance [m] of the skin from the head's centre along d (..., 3)."""
+    """Distance [m] of the skin from the head's center along d (..., 3)."""
     front = np.where(d[..., 0] > 0, 0.072, 0.090)
     height = np.where(d[..., 2] > 0, 0.088, 0.080)
     r = 1 / np.sqrt(
@@ -244,7 +244,7 @@ def _directions(rows: int, columns: int) -> tuple[Array, Array, Array]:
 
 
 def on_face(azimuth: Array, elevation: Array, lift: float) -> Array:
-    """Points (..., 3) `lift` metres above the skin."""
+    """Points (..., 3) `lift` meters above the skin."""
     a, e = np.asarray(azimuth), np.asarray(elevation)
     d = np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)], -1)
     return HEAD_CENTER + d * (head_radius(d) + lift)[..., None]

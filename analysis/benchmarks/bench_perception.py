@@ -3,7 +3,7 @@
 python analysis/benchmarks/bench_perception.py [--quick]
     [--only accuracy|false|cost|gaze|twin]
 
-Costs are CPU times of this process, told as ratios to one bare colour render
+Costs are CPU times of this process, told as ratios to one bare color render
 of Drake's own RgbdSensor at the same size; images that are asked for twice in
 a row are made anew by moving the camera a hair.
 """

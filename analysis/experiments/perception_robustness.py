@@ -77,7 +77,7 @@ def add_distractors(
 def hide_part(
     image: Array, outline: Array, part: float, rng: np.random.Generator
 ) -> Array:
-    """Something skin-coloured and round over a part of the marker."""
+    """Something skin-colored and round over a part of the marker."""
     low, high = np.floor(outline.min(0)) - 1, np.ceil(outline.max(0)) + 1
     size = (high - low).astype(int) + 1
     marker = np.zeros(size[::-1], np.uint8)

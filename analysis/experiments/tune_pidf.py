@@ -71,9 +71,9 @@ def main() -> None:
             reference.t, np.degrees(reference.q[:, i]), color=DESIRED, lw=2.5
         )
         errors = []
-        for run, colour in zip(runs, (BEFORE, AFTER), strict=True):
+        for run, color in zip(runs, (BEFORE, AFTER), strict=True):
             q = np.degrees(run.q[:, i])
-            ax.plot(reference.t[: len(q)], q, color=colour, lw=1.1)
+            ax.plot(reference.t[: len(q)], q, color=color, lw=1.1)
             error = run.q[:, i] - reference.q[: len(q), i]
             error = error[reference.counted[: len(q)]]
             errors.append(np.degrees(np.sqrt(np.mean(error**2))))

@@ -74,7 +74,7 @@ def describe(true: TrueMap) -> tuple[list[str], dict[str, np.ndarray]]:
 def draw_maps(
     maps: list[tuple[TrueMap, dict[str, np.ndarray]]], path: Path
 ) -> None:
-    """Each changed view's τ̂ over the table, coloured by the affine error."""
+    """Each changed view's τ̂ over the table, colored by the affine error."""
     columns = 4
     rows = -(-len(maps) // columns)
     figure, axes = plt.subplots(
@@ -103,9 +103,9 @@ def draw_maps(
             f"{rms['projective']:.2f},\nquadratic {rms['quadratic']:.2f} cm",
             fontsize=9,
         )
-        centred = true.view.sight.fixed_yaw is None
-        axis.set_xlabel("y_img" if centred else "x_img", fontsize=8)
-        axis.set_ylabel("q3* [rad]" if centred else "y_img", fontsize=8)
+        centered = true.view.sight.fixed_yaw is None
+        axis.set_xlabel("y_img" if centered else "x_img", fontsize=8)
+        axis.set_ylabel("q3* [rad]" if centered else "y_img", fontsize=8)
         axis.tick_params(labelsize=7)
     figure.tight_layout()
     figure.subplots_adjust(right=0.92)

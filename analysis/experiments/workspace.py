@@ -15,13 +15,13 @@ import numpy as np
 from pydrake.multibody.plant import AddMultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
-from drake_affetto.scene import world
-from drake_affetto.scene.workspace import (
+from drake_affetto.experiments.workspace import (
     Workspace,
     WorkspaceConfig,
     compute_workspace,
     largest_box,
 )
+from drake_affetto.scene import world
 from drake_affetto.station.scenario import Scenario, load_scenario
 
 _REGIONS = (
@@ -106,17 +106,17 @@ def draw(
             label="where trials put it",
         )
     )
-    centre = 0.5 * (lower + upper)
+    center = 0.5 * (lower + upper)
     ax.add_patch(
         Circle(
-            centre[::-1],
+            center[::-1],
             world.drum_radius(plant, context),
             facecolor="#b22222",
             alpha=0.18,
             edgecolor="none",
         )
     )
-    ax.text(centre[1], centre[0], "drum", ha="center", va="center")
+    ax.text(center[1], center[0], "drum", ha="center", va="center")
     # Mirror: where the glass stands and how far it leans
     X_WM = plant.GetFrameByName("mirror").CalcPoseInWorld(context)
     w, h = 0.5 * world.mirror_size(plant, context)
@@ -159,7 +159,7 @@ def draw(
         xlabel="y [m] (left is left)",
         ylabel="x [m] (forwards)",
         aspect="equal",
-        title="Where the drum's centre can be",
+        title="Where the drum's center can be",
     )
     ax.legend(handles=handles, loc="lower left", framealpha=0.95)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -186,7 +186,7 @@ def main() -> None:
     yaw = np.degrees(result.yaw[usable])
     area = result.mirror_area[usable]
     print(f"usable: {usable.sum() * (1e2 * args.step) ** 2:.0f} cm² of table")
-    print(f"yaw that centres the marker: {yaw.min():.1f} .. {yaw.max():.1f}°")
+    print(f"yaw that centers the marker: {yaw.min():.1f} .. {yaw.max():.1f}°")
     print(f"marker in the mirror: {area.min():.0f} .. {area.max():.0f} px²")
     for what, margin in (("largest box", 0.0), ("with 1 cm to spare", 0.01)):
         low, high = largest_box(result.x, result.y, usable, margin)

@@ -4,7 +4,7 @@
         [--domain unit|wide] [--results DIR] [--out DIR]
 
 Draws, for one seed and one choice of five points, what the ELM predicts (as
-colours between black contours of the truth, which the predictions should
+colors between black contours of the truth, which the predictions should
 follow): (a) where it has learned, (b) on the turned square, (c) there, through
 the map h of the default transfer, and beside it of the paper's single start.
 With `--results`, the folder of an `affetto toy`, the lowest row shows how the
@@ -31,7 +31,7 @@ def grid(low, high, turn, n=60):
     return Z, Z @ turn.T
 
 
-def panel(axes, X, values, truth, levels, title, points, labelled):
+def panel(axes, X, values, truth, levels, title, points, labeled):
     """One map of predictions with contours of the truth."""
     n = round(np.sqrt(len(X)))
     x, y = X[:, 0].reshape(n, n), X[:, 1].reshape(n, n)
@@ -42,8 +42,8 @@ def panel(axes, X, values, truth, levels, title, points, labelled):
         x, y, truth.reshape(n, n), levels[::3], colors="k", linewidths=0.6
     )
     axes.scatter(*points.T, s=7, c="white", linewidths=0)
-    if labelled is not None:
-        axes.scatter(*labelled.T, s=55, c="red", edgecolors="white")
+    if labeled is not None:
+        axes.scatter(*labeled.T, s=55, c="red", edgecolors="white")
     error = np.mean((values - truth) ** 2)
     axes.set_title(f"{title}\nmean squared error {error:.3g}", fontsize=10)
     axes.set(xlabel="$x_1$", ylabel="$x_2$", aspect="equal")
@@ -91,10 +91,10 @@ def maps(figure, domain, seed, repeat):
         ),
     ]
     axes = figure.subplots(1, len(panels))
-    for a, (title, where, values, points, labelled) in zip(
+    for a, (title, where, values, points, labeled) in zip(
         axes, panels, strict=True
     ):
-        filled = panel(a, where, values, truth, levels, title, points, labelled)
+        filled = panel(a, where, values, truth, levels, title, points, labeled)
     figure.colorbar(filled, ax=axes, label="f", shrink=0.8)
 
 

@@ -5,7 +5,7 @@
 
 Draws from the folder of an `affetto mirror`: success of each scheme with 3, 4
 and 5 samples, with 95 % intervals (5a); and for each number of samples the
-corrected p of all pairs (5b), coloured where it is below 0.05. Of an `affetto
+corrected p of all pairs (5b), colored where it is below 0.05. Of an `affetto
 mirror --all-scenarios` it draws success by scheme and scenario instead. Writes
 fig5_mirror_transfer.png.
 """

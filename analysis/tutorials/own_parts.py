@@ -43,7 +43,7 @@ def tell(what, value):
 print("1. A policy of one's own: any regressor from τ to θ")
 
 
-class Neighbours:
+class Neighbors:
     """Averages the demonstrations, the nearest counting most."""
 
     def __init__(self, tau, theta):
@@ -62,7 +62,7 @@ class Neighbours:
 trials = TrialRunner(scenario)
 threshold = trials.reward_config.threshold
 taught = drum_xy + [[-0.03, 0.04], [0.03, 0.04], [0.0, -0.05]]
-policy = Neighbours(
+policy = Neighbors(
     tau=[trials.gaze(xy, seed=0).task_parameter for xy in taught],
     theta=[trials.teach(xy, seed=0).theta for xy in taught],
 )
@@ -189,7 +189,7 @@ def play(add_mine, **sources):
     station.set_drum_position(root, drum_xy)
     simulator.AdvanceTo(2.8)
     contact, knock, flow = (log.FindLog(root).data().T for log in logs)
-    heard = voice.synthesise(
+    heard = voice.synthesize(
         logs[0].FindLog(root).sample_times(),
         *contact.T,
         *knock.T,

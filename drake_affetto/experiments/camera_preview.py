@@ -13,12 +13,12 @@ from drake_affetto.common.output import atomic_path
 from drake_affetto.common.typing import Array, Image
 from drake_affetto.experiments.episode import FRAME_PERIOD, TrialRunner
 from drake_affetto.perception.blob import BlobCalibration
-from drake_affetto.perception.camera_model import Mirror, SightModel
+from drake_affetto.perception.camera_model import CameraModel, Mirror
 from drake_affetto.perception.drawing import TRUTH, WORKSPACE, Canvas
 from drake_affetto.perception.gaze import GazePhase
 from drake_affetto.perception.plant_camera_model import (
     calibrate_view,
-    make_sight_model,
+    make_camera_model,
     mirrors_in_world,
 )
 from drake_affetto.scene import world
@@ -36,10 +36,10 @@ class Sight:
         model: camera, yaw and marker.
         mirrors: the mirrors in the scene.
         positions: (m, 2) places that span the drum's region [m].
-        fixed_yaw: from which the scenario looks; None if it centres.
+        fixed_yaw: from which the scenario looks; None if it centers.
     """
 
-    model: SightModel
+    model: CameraModel
     mirrors: list[Mirror]
     positions: Array
     fixed_yaw: float | None
@@ -58,7 +58,7 @@ class Sight:
         """The yaw [rad] from which the drum at xy is looked at.
 
         Raises:
-            InputError: if no yaw centres the marker.
+            InputError: if no yaw centers the marker.
         """
         if self.fixed_yaw is not None:
             return self.fixed_yaw
@@ -66,7 +66,7 @@ class Sight:
         if not np.isfinite(yaw):
             raise InputError(
                 f"the marker of a drum at {np.round(xy, 3).tolist()} cannot "
-                "be centred: the yaw would be beyond its limits "
+                "be centered: the yaw would be beyond its limits "
                 f"{self.model.yaw_min:.3g} to {self.model.yaw_max:.3g} rad"
             )
         return yaw
@@ -82,7 +82,7 @@ class Sight:
     def task_parameters(self, xy: Array, calibration: BlobCalibration) -> Array:
         """τ or τ̂ (n, 2) of drums at xy (n, 2), by geometry alone."""
         yaw, uv = self.pixels(xy)
-        image = calibration.normalise(uv)
+        image = calibration.normalize(uv)
         if self.fixed_yaw is None:
             return np.stack([image[:, 1], yaw], axis=-1)
         return image
@@ -100,7 +100,7 @@ def make_sight(station: AffettoStation, context: Context) -> Sight:
     scenario = station.scenario
     plant_context = station.plant.GetMyContextFromRoot(context)
     return Sight(
-        make_sight_model(
+        make_camera_model(
             station.plant, plant_context, scenario.camera, scenario.yaw_joint
         ),
         mirrors_in_world(

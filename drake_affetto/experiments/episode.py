@@ -387,7 +387,7 @@ class TrialRunner:
         _, flow = self._log("affetto.mass_flow")
         joint_t, state = self._log("affetto.estimated_state")
         t = t - start
-        sound = self.voice.synthesise(
+        sound = self.voice.synthesize(
             t,
             contact[:, 0],
             contact[:, 1],

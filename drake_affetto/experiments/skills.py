@@ -30,7 +30,7 @@ _FEWEST = 3
 
 
 def make_skill(config: SkillConfig, seed: int) -> ElmRegressor:
-    """An untrained parameterised skill (paper Eqs. 3 and 4)."""
+    """An untrained parameterized skill (paper Eqs. 3 and 4)."""
     return ElmRegressor(
         n_hidden=config.n_hidden,
         alpha=config.alpha,

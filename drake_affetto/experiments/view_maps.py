@@ -13,6 +13,7 @@ import numpy as np
 from pydrake.systems.framework import Context
 from scipy.optimize import least_squares
 
+from drake_affetto.common.typing import Array
 from drake_affetto.experiments.camera_preview import (
     Sight,
     make_sight,
@@ -21,13 +22,11 @@ from drake_affetto.experiments.camera_preview import (
 )
 from drake_affetto.geometry.optics import make_pose
 from drake_affetto.perception.blob import BlobCalibration
-from drake_affetto.perception.camera_model import SightModel
+from drake_affetto.perception.camera_model import CameraModel
 from drake_affetto.perception.config import rotation_matrix
 from drake_affetto.perception.optical_map import OpticalMap
 from drake_affetto.station.scenario import load_scenario
 from drake_affetto.station.station import AffettoStation
-
-Array = np.ndarray
 
 CHANGED_VIEWS = (
     "mirror",
@@ -276,8 +275,8 @@ class CalibrationError:
 
 
 def with_error(
-    model: SightModel, error: CalibrationError, rng: np.random.Generator
-) -> SightModel:
+    model: CameraModel, error: CalibrationError, rng: np.random.Generator
+) -> CameraModel:
     """The sight as it is believed to be, wrong in a random direction."""
     sign = rng.choice([-1.0, 1.0])
     camera = dataclasses.replace(

@@ -4,11 +4,12 @@ No Drake: arrays in, arrays out. A pose X_AB is a 4 × 4 homogeneous matrix.
 `drake_affetto.scene.world.serial_chain` reads a chain from a plant.
 """
 
+from collections.abc import Mapping
 import dataclasses
 
 import numpy as np
 
-Array = np.ndarray
+from drake_affetto.common.typing import Array
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,7 +37,7 @@ class SerialChain:
         """Where `names` stand among the chain's joints."""
         return np.array([self.names.index(name) for name in names])
 
-    def posture(self, angles: dict[str, float]) -> Array:
+    def posture(self, angles: Mapping[str, float]) -> Array:
         """(n,) joint angles; those that `angles` does not name are zero."""
         return np.array([angles.get(name, 0.0) for name in self.names])
 

@@ -4,8 +4,8 @@ Frames are in monogram notation: W the world, C a camera (z forward, x right,
 y down), M a mirror (z its normal, into the room). A pose X_AB is given as a
 4 × 4 homogeneous matrix.
 
-Pixel coordinates (u, v) are integers at the centres of the pixels: (0, 0) is
-the centre of the top left one, and the image spans [-½, W - ½] × [-½, H - ½].
+Pixel coordinates (u, v) are integers at the centers of the pixels: (0, 0) is
+the center of the top left one, and the image spans [-½, W - ½] × [-½, H - ½].
 The engine's own principal point is counted from the image's corner instead:
 half a pixel more. `PinholeCamera.center_x`, `center_y` are in the engine's
 convention (that of Drake's CameraInfo), so that W/2, H/2 is the middle of the
@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-Array = np.ndarray
+from drake_affetto.common.typing import Array, Mask
 
 
 def make_pose(R: Array, p: Array) -> Array:
@@ -37,6 +37,11 @@ def invert_pose(X_AB: Array) -> Array:
 def transform_points(X_AB: Array, p_BQ: Array) -> Array:
     """p_AQ of points p_BQ (..., 3)."""
     return np.asarray(p_BQ, dtype=float) @ X_AB[:3, :3].T + X_AB[:3, 3]
+
+
+def points_in_frame(X_WF: Array, p_W: Array) -> Array:
+    """p_F (..., k, 3) of points p_W (..., k, 3) in frames X_WF (..., 4, 4)."""
+    return (p_W - X_WF[..., None, :3, 3]) @ X_WF[..., :3, :3]
 
 
 # Cameras and lenses
@@ -72,6 +77,18 @@ class PinholeCamera:
     def image_center(self) -> Array:
         """Pixel coordinates (2,) of the middle of the image."""
         return np.array([0.5 * (self.width - 1), 0.5 * (self.height - 1)])
+
+    def inside(self, uv: Array, margin: float = 0.0) -> Mask:
+        """Whether pixels uv (..., 2) are in the image.
+
+        Args:
+            uv: Pixel coordinates; NaN is outside.
+            margin: Least distance from the image's edge, px.
+        """
+        low = margin - 0.5
+        high = np.array([self.width, self.height]) - 0.5 - margin
+        with np.errstate(invalid="ignore"):
+            return np.all((uv >= low) & (uv <= high), axis=-1)
 
     def project(self, p_C: Array) -> Array:
         """Pixel coordinates (..., 2) of points (..., 3) before the camera.
@@ -417,6 +434,13 @@ def disc_outline(
     )
 
 
+def polygon_area(uv: Array) -> Array:
+    """Area of simple polygons (..., n, 2)."""
+    x, y = uv[..., 0], uv[..., 1]
+    twice = x * np.roll(y, -1, axis=-1) - y * np.roll(x, -1, axis=-1)
+    return 0.5 * np.abs(twice.sum(axis=-1))
+
+
 def polygon_area_centroid(uv: Array) -> tuple[float, Array]:
     """Area and centroid (2,) of a simple polygon (n, 2)."""
     origin = uv.mean(axis=0)
@@ -445,7 +469,7 @@ def project_disc(
     """A disc's image, seen directly or (with X_WM) in a mirror.
 
     The centroid of the projected disc is what moments of the image measure;
-    it is not the projection of the disc's centre.
+    it is not the projection of the disc's center.
 
     Returns:
         (centroid (2,) [pixels], area [pixels²], outline (n, 2) [pixels]);

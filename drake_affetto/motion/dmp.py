@@ -30,14 +30,13 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import lfilter
 
 from drake_affetto.common.errors import InputError, require, require_range
-
-FloatArray = NDArray[np.float64]
+from drake_affetto.common.typing import Array
 
 # Gauss-Legendre nodes and weights for the forcing term within one step, on
 # [0, 1]. Four of them leave an error below 1e-12 rad for steps up to a quarter
@@ -60,7 +59,7 @@ class DmpConfig:
         stiffness: 1/s², k_S.
         damping: 1/s, k_D; None for critical damping, 2 √k_S.
         width: the standard deviation of a basis function in units of the
-            distance between neighbours, so V = (K - 1)² / (2 width²).
+            distance between neighbors, so V = (K - 1)² / (2 width²).
         method: how `encode` finds θ. "trajectory": the rollout comes closest
             to the demonstrated positions. "forcing": the forcing term comes
             closest to the one that the smoothed demonstration would need.
@@ -110,10 +109,10 @@ class DmpConfig:
 class Rollout(NamedTuple):
     """A movement: time (N,), and position, velocity, acceleration (N, n)."""
 
-    t: FloatArray
-    q: FloatArray
-    q_dot: FloatArray
-    q_ddot: FloatArray
+    t: Array
+    q: Array
+    q_dot: Array
+    q_ddot: Array
 
 
 class StepTable(NamedTuple):
@@ -128,8 +127,8 @@ class StepTable(NamedTuple):
         duration: s, T.
     """
 
-    transition: FloatArray
-    forcing: FloatArray
+    transition: Array
+    forcing: Array
     phase_step: float
     dt: float
     duration: float
@@ -196,12 +195,12 @@ class Dmp:
         return self._config.duration
 
     @property
-    def centers(self) -> FloatArray:
-        """(K,), the phases C_k on which the basis functions are centred."""
+    def centers(self) -> Array:
+        """(K,), the phases C_k on which the basis functions are centered."""
         return self._centers.copy()
 
-    def basis(self, phase: ArrayLike) -> FloatArray:
-        """The normalised basis functions ψ(x): phase (N,) to (N, K)."""
+    def basis(self, phase: ArrayLike) -> Array:
+        """The normalized basis functions ψ(x): phase (N,) to (N, K)."""
         phase = np.atleast_1d(np.asarray(phase, dtype=float))
         exponent = (phase[:, None] - self._centers) ** 2
         # Subtracting the least leaves the quotient as it is, and keeps it a
@@ -211,7 +210,7 @@ class Dmp:
         psi /= psi.sum(axis=1, keepdims=True)
         return psi
 
-    def weights(self, theta: ArrayLike) -> FloatArray:
+    def weights(self, theta: ArrayLike) -> Array:
         """θ (n·K,) as an array (n, K), a row for each joint.
 
         Raises:
@@ -277,7 +276,7 @@ class Dmp:
         # One product for q, q̇ and q̈ of all joints.
         moved = response.reshape(-1, self.n_basis) @ weights.T
         moved = moved.reshape(3, steps + 1, -1)
-        t: FloatArray = dt * np.arange(steps + 1, dtype=float)
+        t: Array = dt * np.arange(steps + 1, dtype=float)
         if goal is start and velocity is None:
             moved[0] += start
         else:
@@ -301,7 +300,7 @@ class Dmp:
         goal: ArrayLike,
         dt: float,
         duration: float | None = None,
-    ) -> tuple[float, FloatArray, FloatArray]:
+    ) -> tuple[float, Array, Array]:
         """One step of length dt; exact, so it agrees with `rollout`.
 
         Args:
@@ -345,9 +344,9 @@ class Dmp:
     def advance(
         self,
         phase: float,
-        state: FloatArray,
-        weights: FloatArray | None,
-        goal: FloatArray,
+        state: Array,
+        weights: Array | None,
+        goal: Array,
         table: StepTable,
     ) -> float:
         """`step` without its checks, in place: for loops that run often.
@@ -380,7 +379,7 @@ class Dmp:
         goal: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
         duration: float | None = None,
-    ) -> FloatArray:
+    ) -> Array:
         """The policy parameters that reproduce one or several demonstrations.
 
         A demonstration's first sample is its start posture. Its length is the
@@ -439,14 +438,14 @@ class Dmp:
         require_range("duration", duration, 1e-3, 1e6)
         return float(duration)
 
-    def _posture(self, field: str, value: ArrayLike, n: int) -> FloatArray:
+    def _posture(self, field: str, value: ArrayLike, n: int) -> Array:
         value = np.asarray(value, dtype=float)
         require(value.shape == (n,), f"{field}.shape", value.shape, f"({n},)")
         _require_finite(field, value)
         return value
 
     def _check_demonstration(
-        self, t: FloatArray, q: FloatArray, duration: float | None
+        self, t: Array, q: Array, duration: float | None
     ) -> None:
         require(
             t.ndim == 1 and len(t) >= 4,
@@ -477,7 +476,7 @@ class Dmp:
             1.0 / stretch**2,
         )
 
-    def _homogeneous(self, t: FloatArray, duration: float) -> FloatArray:
+    def _homogeneous(self, t: Array, duration: float) -> Array:
         """What is left of an initial [q - g, q̇] after t.
 
         Returns:
@@ -491,7 +490,7 @@ class Dmp:
         )
         return np.stack([transition[:, 0], transition[:, 1], acceleration])
 
-    def _forcing(self, phase: float, table: StepTable) -> FloatArray:
+    def _forcing(self, phase: float, table: StepTable) -> Array:
         """(2, K), what the forcing adds in the step that begins at `phase`."""
         index = round((1.0 - phase) / table.phase_step)
         on_grid = abs(1.0 - index * table.phase_step - phase) < 1e-9
@@ -501,8 +500,8 @@ class Dmp:
         return self._forcing_terms(phases, table.dt, table.duration)[0]
 
     def _forcing_terms(
-        self, phases: FloatArray, dt: float, duration: float
-    ) -> FloatArray:
+        self, phases: Array, dt: float, duration: float
+    ) -> Array:
         """∫ exp(A (dt - s)) b ψ(x - s/T) ds over a step, up to x = 0.
 
         Args:
@@ -533,7 +532,7 @@ class Dmp:
         stiffness, damping, _ = self._rates(duration)
         phase_step = dt / duration
         steps = math.ceil(1.0 / phase_step - 1e-9)
-        phases: FloatArray = 1.0 - phase_step * np.arange(steps, dtype=float)
+        phases: Array = 1.0 - phase_step * np.arange(steps, dtype=float)
         return StepTable(
             transition=_transition(np.array(dt), stiffness, damping),
             forcing=self._forcing_terms(phases, dt, duration),
@@ -542,16 +541,14 @@ class Dmp:
             duration=duration,
         )
 
-    def _response(self, dt: float, steps: int, duration: float) -> FloatArray:
+    def _response(self, dt: float, steps: int, duration: float) -> Array:
         """(3, N, K), q, q̇ and q̈ after rest, for each basis function alone."""
         return self._responses.get(
             (dt, steps, duration),
             lambda: self._make_response(dt, steps, duration),
         )
 
-    def _make_response(
-        self, dt: float, steps: int, duration: float
-    ) -> FloatArray:
+    def _make_response(self, dt: float, steps: int, duration: float) -> Array:
         stiffness, damping, gain = self._rates(duration)
         table = self.step_table(dt, duration)
         added = np.zeros((steps, 2, self.n_basis))
@@ -577,7 +574,7 @@ class Dmp:
         response[2, inside] += gain * self.basis(phases[inside])
         return response
 
-    def _design(self, t: FloatArray, duration: float | None) -> "_Design":
+    def _design(self, t: Array, duration: float | None) -> "_Design":
         """The least-squares problem of a demonstration sampled at t (N,)."""
         duration = float(t[-1]) if duration is None else float(duration)
         make = (
@@ -589,9 +586,7 @@ class Dmp:
             (duration, t.tobytes()), lambda: make(t, duration)
         )
 
-    def _make_trajectory_design(
-        self, t: FloatArray, duration: float
-    ) -> "_Design":
+    def _make_trajectory_design(self, t: Array, duration: float) -> "_Design":
         response = self._response_at(t, duration)
         # In units of the forcing term, in which a constant weight of 1 moves
         # the joint by 1 / k_S.
@@ -602,7 +597,7 @@ class Dmp:
             self._homogeneous(t, duration)[0],
         )
 
-    def _make_forcing_design(self, t: FloatArray, duration: float) -> "_Design":
+    def _make_forcing_design(self, t: Array, duration: float) -> "_Design":
         config = self._config
         psi = self.basis(np.clip(1.0 - t / duration, 0.0, 1.0))
         # Past the end there is no forcing to learn from.
@@ -619,13 +614,13 @@ class Dmp:
         )
 
     def _finish_design(
-        self, design: FloatArray, operator: FloatArray, decay: FloatArray
+        self, design: Array, operator: Array, decay: Array
     ) -> "_Design":
         gram = design.T @ design
         ridge = len(design) * self._config.ridge * np.eye(self.n_basis)
         return _Design(operator, gram, decay, _factor(gram + ridge))
 
-    def _response_at(self, t: FloatArray, duration: float) -> FloatArray:
+    def _response_at(self, t: Array, duration: float) -> Array:
         """(N, K), the positions of `_response` at any t >= 0."""
         steps = len(t) - 1
         dt = float(t[-1]) / steps
@@ -649,13 +644,13 @@ class Dmp:
 class _Design(NamedTuple):
     """θ = (gram + ridge)⁻¹ operator (q - g - decay [q0 - g, q̇0])."""
 
-    operator: FloatArray  # (K, N)
-    gram: FloatArray  # (K, K), without the ridge
-    decay: FloatArray  # (N, 2)
+    operator: Array  # (K, N)
+    gram: Array  # (K, K), without the ridge
+    decay: Array  # (N, 2)
     factor: Any  # of gram with the ridge
 
 
-def _factor(gram: FloatArray) -> Any:
+def _factor(gram: Array) -> Any:
     try:
         return cho_factor(gram, check_finite=False)
     except np.linalg.LinAlgError:
@@ -665,7 +660,7 @@ def _factor(gram: FloatArray) -> Any:
         ) from None
 
 
-def _transition(t: FloatArray, stiffness: float, damping: float) -> FloatArray:
+def _transition(t: Array, stiffness: float, damping: float) -> Array:
     """exp(A t) for A = [[0, 1], [-k, -d]]: t (...) to (..., 2, 2)."""
     half = 0.5 * damping
     root = np.emath.sqrt(half**2 - stiffness)
@@ -693,11 +688,11 @@ def _transition(t: FloatArray, stiffness: float, damping: float) -> FloatArray:
 
 
 def _smoothing_operator(
-    t: FloatArray, smoothing: float
-) -> tuple[list[FloatArray], FloatArray]:
+    t: Array, smoothing: float
+) -> tuple[list[Array], Array]:
     """A penalised spline fit, and its derivatives at the samples.
 
-    The spline S, of degree 5, minimises the mean of (y - S(t))² plus
+    The spline S, of degree 5, minimizes the mean of (y - S(t))² plus
     smoothing⁶ times the mean of its third derivative squared: it follows
     oscillations slower than 1/smoothing (rad/s) and flattens faster ones.
 
@@ -729,7 +724,7 @@ def _smoothing_operator(
     return derivatives, fit
 
 
-def _pair(t: Any, q: Any) -> list[tuple[FloatArray, FloatArray]]:
+def _pair(t: Any, q: Any) -> list[tuple[Array, Array]]:
     """One demonstration or a list of them as a list of pairs of arrays."""
     several = isinstance(t, (list, tuple)) and len(t) > 0 and np.ndim(t[0]) > 0
     if not several:
@@ -751,7 +746,7 @@ def _pair(t: Any, q: Any) -> list[tuple[FloatArray, FloatArray]]:
     return pairs
 
 
-def _require_finite(field: str, value: FloatArray) -> None:
+def _require_finite(field: str, value: Array) -> None:
     # The sum of finite numbers of a sane size is finite, and is one call.
     if not math.isfinite(value.sum()):
         require(bool(np.isfinite(value).all()), field, value, "finite numbers")

@@ -18,12 +18,11 @@ import math
 
 import numpy as np
 
+from drake_affetto.common.typing import Array, Mask
 from drake_affetto.geometry import optics
 from drake_affetto.geometry.optics import Camera
 from drake_affetto.perception.blob import Blob
 from drake_affetto.perception.camera_model import Mirror
-
-Array = np.ndarray
 
 # Fitted to 117 rendered places, direct and mirrored, at 320 × 240 pixels.
 _RASTER = 0.055  # standard deviation in u and in v [pixels]
@@ -42,7 +41,7 @@ _SAMPLES = 60
 
 
 @dataclasses.dataclass(frozen=True)
-class Hiders:
+class Occluders:
     """Ellipsoids that may hide the marker.
 
     Attributes:
@@ -53,7 +52,7 @@ class Hiders:
 
     X_WE: Array
     radii: Array
-    on_camera: Array
+    on_camera: Mask
 
 
 def visible_marker(
@@ -62,7 +61,7 @@ def visible_marker(
     X_WD: Array,
     radius: float,
     mirror: Mirror | None = None,
-    hiders: Hiders | None = None,
+    occluders: Occluders | None = None,
     near: float = 0.01,
 ) -> tuple[float, Array]:
     """Area [pixels²] and centroid (2,) [pixels] of what is seen of the disc.
@@ -73,7 +72,7 @@ def visible_marker(
         X_WD: pose (4, 4) of the disc, its painted side along +z.
         radius: of the disc [m].
         mirror: in which it is seen; None for the direct view.
-        hiders: what may stand in the way.
+        occluders: what may stand in the way.
         near: depth [m] below which nothing is seen.
     """
     nothing = 0.0, np.full(2, np.nan)
@@ -107,9 +106,9 @@ def visible_marker(
     if len(uv) < 3:
         return nothing
     area, centroid = optics.polygon_area_centroid(uv)
-    if area > 0.0 and hiders is not None:
+    if area > 0.0 and occluders is not None:
         return _take_away_hidden(
-            area, centroid, camera, X_WC, X_WD, radius, mirror, hiders
+            area, centroid, camera, X_WC, X_WD, radius, mirror, occluders
         )
     return area, centroid
 
@@ -159,7 +158,7 @@ def _take_away_hidden(
     X_WD: Array,
     radius: float,
     mirror: Mirror | None,
-    hiders: Hiders,
+    occluders: Occluders,
 ) -> tuple[float, Array]:
     """Area and centroid without the part that something stands before."""
     eye = X_WC[:3, 3]
@@ -180,12 +179,14 @@ def _take_away_hidden(
         legs = [(p_W, hit, False), (hit, np.broadcast_to(eye, hit.shape), True)]
     hidden = np.zeros(len(p_W), dtype=bool)
     for start, end, to_eye in legs:
-        near = _near_segment(hiders, start.mean(axis=0), end.mean(axis=0))
+        near = _near_segment(occluders, start.mean(axis=0), end.mean(axis=0))
         if to_eye:
             # What carries the camera is nearer than what it shows.
-            near &= ~hiders.on_camera
+            near &= ~occluders.on_camera
         for index in np.flatnonzero(near):
-            hidden |= _hits(hiders.X_WE[index], hiders.radii[index], start, end)
+            hidden |= _hits(
+                occluders.X_WE[index], occluders.radii[index], start, end
+            )
     if not hidden.any():
         return area, centroid
     uv = camera.project(
@@ -207,16 +208,16 @@ def _take_away_hidden(
 
 
 def _near_segment(
-    hiders: Hiders, a: Array, b: Array, margin: float = 0.06
-) -> Array:
+    occluders: Occluders, a: Array, b: Array, margin: float = 0.06
+) -> Mask:
     """Which ellipsoids (k,) may come near the way from a to b."""
-    c, d = hiders.X_WE[:, :3, 3], b - a
+    c, d = occluders.X_WE[:, :3, 3], b - a
     s = np.clip((c - a) @ d / max(float(d @ d), 1e-12), 0.0, 1.0)
     distance = np.linalg.norm(a + s[:, None] * d - c, axis=1)
-    return distance <= hiders.radii.max(axis=1) + margin
+    return distance <= occluders.radii.max(axis=1) + margin
 
 
-def _hits(X_WE: Array, radii: Array, start: Array, end: Array) -> Array:
+def _hits(X_WE: Array, radii: Array, start: Array, end: Array) -> Mask:
     """Which segments (n, 3) – (n, 3) meet an ellipsoid."""
     X_EW = optics.invert_pose(X_WE)
     a = optics.transform_points(X_EW, start) / radii

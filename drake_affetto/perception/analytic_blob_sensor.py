@@ -17,7 +17,7 @@ from pydrake.systems.framework import (
 from drake_affetto.common.errors import InputError, require
 from drake_affetto.geometry.optics import project_disc
 from drake_affetto.perception.analytic import (
-    Hiders,
+    Occluders,
     completed,
     measured_blob,
     visible_marker,
@@ -52,7 +52,7 @@ class AnalyticBlobSensor(BlobReporter):
 
     The marker's outline is projected, cut by mirror and image, and the robot's
     parts, as ellipsoids, take away what they hide; see `analytic` for the
-    errors that are added. Exposure and colour of the light do not matter to
+    errors that are added. Exposure and color of the light do not matter to
     it; motion blur it cannot do, and says so.
     """
 
@@ -149,7 +149,7 @@ class AnalyticBlobSensor(BlobReporter):
                 "analytic camera, which cannot do it"
             )
         X_WD = query.GetPoseInWorld(self._marker_id) @ self._X_BD
-        hiders = self._hiders(query, sight.camera_id)
+        occluders = self._hiders(query, sight.camera_id)
         X_WD = X_WD.GetAsMatrix4()
         seen = [
             visible_marker(
@@ -158,7 +158,7 @@ class AnalyticBlobSensor(BlobReporter):
                 X_WD,
                 self._radius,
                 mirror,
-                hiders,
+                occluders,
                 self._camera.near,
             )
             for mirror in (None, *sight.mirrors)
@@ -194,7 +194,7 @@ class AnalyticBlobSensor(BlobReporter):
         left, upper, right, lower = self._config.region
         return bool(left <= part[0] <= right and upper <= part[1] <= lower)
 
-    def _hiders(self, query: Any, camera_id: int) -> Hiders | None:
+    def _hiders(self, query: Any, camera_id: int) -> Occluders | None:
         """The robot's visible parts, each as the ellipsoid in its box."""
         if self._shapes is None:
             self._shapes = self._read_shapes(query.inspector())
@@ -207,7 +207,7 @@ class AnalyticBlobSensor(BlobReporter):
         on_camera = np.array(
             [f.get_value() == camera_id for f in self._robot_ids]
         )
-        return Hiders(
+        return Occluders(
             X_WF[shapes.frame] @ shapes.X_FE,
             shapes.radii,
             on_camera[shapes.frame],

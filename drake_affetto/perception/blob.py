@@ -1,8 +1,8 @@
-"""Finding the coloured marker in an image, to a fraction of a pixel.
+"""Finding the colored marker in an image, to a fraction of a pixel.
 
 The marker is told by its hue in CIE Lab, a space in which a hue is an angle
 that changes little with the amount of light; area and shape decide among what
-has that hue. Pixel coordinates are those of `optics`: integers at the centres
+has that hue. Pixel coordinates are those of `optics`: integers at the centers
 of the pixels.
 """
 
@@ -15,8 +15,7 @@ import cv2
 import numpy as np
 
 from drake_affetto.common.errors import InputError, require, require_range
-
-Array = np.ndarray
+from drake_affetto.common.typing import Image
 
 
 @dataclasses.dataclass
@@ -50,17 +49,17 @@ class BlobCalibration:
                 f"at least one pixel more than {name}_min ({low:g})",
             )
 
-    def to_vector(self) -> Array:
+    def to_vector(self) -> Image:
         """(u_min, u_max, v_min, v_max) as an array (4,)."""
         return np.array([self.u_min, self.u_max, self.v_min, self.v_max])
 
-    def normalise(self, uv: Array) -> Array:
+    def normalize(self, uv: Image) -> Image:
         """(x_img, y_img) (..., 2) of pixels (..., 2); beyond [0, 1] outside."""
         low = np.array([self.u_min, self.v_min])
         high = np.array([self.u_max, self.v_max])
         return (np.asarray(uv) - low) / (high - low)
 
-    def pixels(self, xy: Array) -> Array:
+    def pixels(self, xy: Image) -> Image:
         """Pixel coordinates (..., 2) of (x_img, y_img) (..., 2)."""
         low = np.array([self.u_min, self.v_min])
         high = np.array([self.u_max, self.v_max])
@@ -68,7 +67,7 @@ class BlobCalibration:
 
 
 def calibrate(
-    uv: Array,
+    uv: Image,
     margin: float = 0.05,
     image_width: int | None = None,
 ) -> BlobCalibration:
@@ -79,7 +78,7 @@ def calibrate(
             workspace; rows with NaN (not seen) are left out.
         margin: what to add on each side, as a fraction of the box.
         image_width: if given, x spans the whole image instead (direct view:
-            the gaze centres the marker, so that its x says nothing).
+            the gaze centers the marker, so that its x says nothing).
 
     Raises:
         InputError: if the marker was seen at fewer than 3 places.
@@ -161,7 +160,7 @@ class BlobConfig:
             chroma >= 20.0,
             f"{where}.color",
             self.color,
-            "a colour that is told from grey (Lab chroma of at least 20)",
+            "a color that is told from gray (Lab chroma of at least 20)",
         )
         require_range(f"{where}.hue_tolerance", self.hue_tolerance, 1.0, 90.0)
         require_range(f"{where}.chroma", self.chroma, 0.05, 1.0)
@@ -203,7 +202,7 @@ _ON_RIM = 0.6
 
 
 def marker_lab(color: list[float]) -> tuple[float, float, float]:
-    """(lightness, chroma, hue [rad]) of a colour, in OpenCV's 8-bit Lab."""
+    """(lightness, chroma, hue [rad]) of a color, in OpenCV's 8-bit Lab."""
     rgb = np.array([[color]], dtype=float)
     pixel = np.rint(255 * rgb).astype(np.uint8)
     lab = cv2.cvtColor(pixel, cv2.COLOR_RGB2Lab)[0, 0].astype(float)
@@ -214,8 +213,8 @@ def marker_lab(color: list[float]) -> tuple[float, float, float]:
 @functools.lru_cache(maxsize=32)
 def _gate(
     color: tuple[float, ...], hue_tolerance: float, chroma: float
-) -> Array:
-    """Table (256 · 256,) over (a, b): 255 where a colour may be the marker."""
+) -> Image:
+    """Table (256 · 256,) over (a, b): 255 where a color may be the marker."""
     _, marker_chroma, marker_hue = marker_lab(list(color))
     a, b = np.meshgrid(
         np.arange(256) - 128.0, np.arange(256) - 128.0, indexing="ij"
@@ -231,7 +230,7 @@ def _gate(
 @functools.lru_cache(maxsize=32)
 def _coarse_gate(
     color: tuple[float, ...], hue_tolerance: float, chroma: float
-) -> tuple[tuple[Array, Array], ...]:
+) -> tuple[tuple[Image, Image], ...]:
     """Boxes of OpenCV's HSV that hold all that passes the gate in Lab.
 
     HSV takes a quarter of the time of Lab; it says where Lab is worth it.
@@ -263,14 +262,14 @@ def _coarse_gate(
 
 
 def find_candidates(
-    image: Array, config: BlobConfig
+    image: Image, config: BlobConfig
 ) -> tuple[int, int, int, int] | None:
     """The rectangle (left, top, right, bottom) worth a closer look.
 
     All pixels that `segment` could mark lie in it; None if there are none.
     """
     hsv = cv2.cvtColor(image, cv2.COLOR_RGB2HSV)
-    mask: Array | None = None
+    mask: Image | None = None
     for low, high in _coarse_gate(
         tuple(config.color), config.hue_tolerance, config.chroma
     ):
@@ -289,7 +288,7 @@ def find_candidates(
     )
 
 
-def segment(lab: Array, config: BlobConfig) -> Array:
+def segment(lab: Image, config: BlobConfig) -> Image:
     """Mask (h, w) of uint8: 255 where a pixel has the marker's hue."""
     table = _gate(tuple(config.color), config.hue_tolerance, config.chroma)
     index = lab[:, :, 1].astype(np.uint16)
@@ -301,7 +300,7 @@ def segment(lab: Array, config: BlobConfig) -> Array:
 
 
 def _refine(
-    lab: Array, labels: Array, label: int, box: tuple[int, int, int, int]
+    lab: Image, labels: Image, label: int, box: tuple[int, int, int, int]
 ) -> tuple[float, float, float, float, float, float]:
     """Weighted moments of one component: area, centroid, central moments.
 
@@ -345,7 +344,7 @@ def _refine(
     )
 
 
-def detect(image: Array, config: BlobConfig) -> Blob | None:
+def detect(image: Image, config: BlobConfig) -> Blob | None:
     """The marker in an RGB(A) image (h, w, 3 or 4) of uint8; None if unseen.
 
     What passes the gates of hue, chroma, area and shape with the highest
@@ -380,7 +379,7 @@ def detect(image: Array, config: BlobConfig) -> Blob | None:
 
 
 def _moment_blobs(
-    lab: Array, mask: Array, config: BlobConfig, image_area: int
+    lab: Image, mask: Image, config: BlobConfig, image_area: int
 ) -> list[Blob]:
     if not mask.any():
         return []
@@ -408,7 +407,7 @@ def _moment_blobs(
 def _complete(
     blob: Blob,
     moments: tuple[float, float, float, float, float, float],
-    part: Array,
+    part: Image,
     corner: tuple[int, int],
     config: BlobConfig,
 ) -> Blob:
@@ -433,7 +432,7 @@ def _complete(
     offset = rim - [u, v]
     if _off_rim(offset, inverse) <= max(_ROUGH, 0.04 * math.sqrt(area)):
         return blob
-    best: tuple[float, Array, Array] | None = None
+    best: tuple[float, Image, Image] | None = None
     for length in (0.45, 0.6, 0.75):
         for start in range(0, n, max(1, n // 12)):
             arc = np.take(
@@ -470,7 +469,7 @@ def _complete(
     )
 
 
-def _distance(offset: Array, shape: Array) -> Array:
+def _distance(offset: Image, shape: Image) -> Image:
     """Signed distance (n,) [pixels], about, of points (n, 2) off an ellipse.
 
     The ellipse is xᵀ·shape·x = 1 about the origin.
@@ -481,14 +480,14 @@ def _distance(offset: Array, shape: Array) -> Array:
     return np.linalg.norm(offset, axis=1) * (1.0 - 1.0 / r)
 
 
-def _off_rim(offset: Array, shape: Array) -> float:
+def _off_rim(offset: Image, shape: Image) -> float:
     """How far the rim is off the ellipse, at most of its pixels [pixels]."""
     distance = _distance(offset, shape)
     return float(np.quantile(np.abs(distance - np.median(distance)), 0.95))
 
 
-def _fit_ellipse(points: Array) -> tuple[Array, Array] | None:
-    """Centre (2,) and shape (2, 2) of the ellipse nearest to points (n, 2)."""
+def _fit_ellipse(points: Image) -> tuple[Image, Image] | None:
+    """Center (2,) and shape (2, 2) of the ellipse nearest to points (n, 2)."""
     if len(points) < 6:
         return None
     origin = points.mean(axis=0)
@@ -526,7 +525,7 @@ def _judge(
 
 
 def _simple_blobs(
-    lab: Array, mask: Array, config: BlobConfig, image_area: int
+    lab: Image, mask: Image, config: BlobConfig, image_area: int
 ) -> list[Blob]:
     """OpenCV's SimpleBlobDetector on the mask."""
     module: Any = cv2

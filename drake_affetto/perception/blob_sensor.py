@@ -104,7 +104,7 @@ class BlobReporter(LeafSystem):
         if pixels[2] <= 0.0:
             output.SetFromVector(np.array([LOST, LOST, 0.0]))
             return
-        x, y = self.calibration(context).normalise(pixels[:2])
+        x, y = self.calibration(context).normalize(pixels[:2])
         output.SetFromVector(np.array([x, y, 1.0]))
 
     def _calc_pixels(self, context: Context, output: BasicVector) -> None:

@@ -2,7 +2,7 @@
 
 The camera turns with one joint, the yaw of the upper body; the other joints
 stand. With A and B constant, X_WC = A · Rot(axis, yaw) · B. From that follow
-the yaw at which the marker is centred, the task parameters of the direct and
+the yaw at which the marker is centered, the task parameters of the direct and
 of the mirrored view, and where the marker lies if it is seen at a pixel.
 """
 
@@ -11,12 +11,11 @@ import dataclasses
 
 import numpy as np
 
+from drake_affetto.common.typing import Array, Mask
 from drake_affetto.geometry import optics
 from drake_affetto.geometry.kinematics import SerialChain
 from drake_affetto.geometry.optics import Camera
 from drake_affetto.perception.blob import BlobCalibration
-
-Array = np.ndarray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,7 +28,7 @@ class Mirror:
 
 
 @dataclasses.dataclass(frozen=True)
-class MarkerView:
+class MarkerImage:
     """One image of the marker.
 
     Attributes:
@@ -45,7 +44,7 @@ class MarkerView:
 
 
 @dataclasses.dataclass(frozen=True)
-class SightModel:
+class CameraModel:
     """The camera on its turning joint, and the marker.
 
     Attributes:
@@ -53,7 +52,7 @@ class SightModel:
         X_WA: pose (4, 4) of the joint's frame at yaw 0.
         axis: unit vector (3,) of the joint's axis in A.
         X_AC: pose (4, 4) of the camera in A at yaw 0.
-        marker_height: height [m] of the marker's centre in W; it lies level.
+        marker_height: height [m] of the marker's center in W; it lies level.
         marker_radius: its radius [m].
         yaw_min: lower limit [rad] of the joint.
         yaw_max: upper limit [rad].
@@ -78,7 +77,7 @@ class SightModel:
         marker_height: float,
         marker_radius: float,
         X_FC: Array | None = None,
-    ) -> "SightModel":
+    ) -> "CameraModel":
         """Takes the camera's chain of joints apart at the yaw joint.
 
         Args:
@@ -115,14 +114,14 @@ class SightModel:
         return self.X_WA @ _turn(self.axis, yaw) @ self.X_AC
 
     def marker(self, xy: Array) -> Array:
-        """p_W (..., 3) of the marker's centre over a place (..., 2)."""
+        """p_W (..., 3) of the marker's center over a place (..., 2)."""
         xy = np.asarray(xy, dtype=float)
         z = np.full((*xy.shape[:-1], 1), self.marker_height)
         return np.concatenate([xy, z], axis=-1)
 
     def view(
         self, xy: Array, yaw: float, mirror: Mirror | None = None
-    ) -> MarkerView:
+    ) -> MarkerImage:
         """The marker's image, seen directly or in a mirror."""
         X_WC = self.camera_pose(yaw)
         return view_disc(
@@ -153,7 +152,7 @@ class SightModel:
             uv[~seen_in_mirror(X_WC[:3, 3], p_W, mirror)] = np.nan
         return uv
 
-    def centring_yaw(self, p_W: Array) -> Array:
+    def centering_yaw(self, p_W: Array) -> Array:
         """The yaw [rad] at which points (..., 3) are at the image's middle u.
 
         In closed form for a pinhole, whose pixels of equal u are a plane
@@ -190,13 +189,13 @@ class SightModel:
         return best
 
     def direct_pixels(self, xy: Array) -> tuple[Array, Array]:
-        """(yaw (n,), uv (n, 2)) once the marker at xy (n, 2) is centred.
+        """(yaw (n,), uv (n, 2)) once the marker at xy (n, 2) is centered.
 
-        What is centred, as by the gaze servo, is the centroid of the
-        marker's image, which is not its centre's image.
+        What is centered, as by the gaze servo, is the centroid of the
+        marker's image, which is not its center's image.
         """
         xy = np.atleast_2d(np.asarray(xy, dtype=float))
-        yaws = self.centring_yaw(self.marker(xy))
+        yaws = self.centering_yaw(self.marker(xy))
         pixels = np.full((len(xy), 2), np.nan)
         for i, place in enumerate(xy):
             if not np.isfinite(yaws[i]):
@@ -217,17 +216,17 @@ class SightModel:
     ) -> Array:
         """τ = [y_img, q₃*] (n, 2) of drums at xy (n, 2); NaN if unseen."""
         yaws, pixels = self.direct_pixels(xy)
-        y = calibration.normalise(pixels)[:, 1]
+        y = calibration.normalize(pixels)[:, 1]
         return np.stack([y, yaws], axis=-1)
 
     def seen_by(
         self, xy: Array, yaw: float, mirrors: Sequence[Mirror] = ()
-    ) -> tuple[int | None, MarkerView]:
+    ) -> tuple[int | None, MarkerImage]:
         """Where the marker shows largest: which mirror (None: directly).
 
         That is the image that the blob sensor takes.
         """
-        views: list[tuple[int | None, MarkerView]] = [
+        views: list[tuple[int | None, MarkerImage]] = [
             (None, self.view(xy, yaw))
         ]
         for index, mirror in enumerate(mirrors):
@@ -276,24 +275,24 @@ def view_disc(
     normal: Array,
     radius: float,
     mirror: Mirror | None = None,
-) -> MarkerView:
+) -> MarkerImage:
     """The image of a disc, directly or in a mirror, and how much is seen."""
     X_WM = None if mirror is None else mirror.X_WM
     uv, area, outline = optics.project_disc(
         camera, X_WC, center, normal, radius, X_WM
     )
     if area <= 0.0 or not np.all(np.isfinite(outline)):
-        return MarkerView(np.full(2, np.nan), 0.0, 0.0)
+        return MarkerImage(np.full(2, np.nan), 0.0, 0.0)
     size = np.array([camera.width, camera.height])
     inside = np.all((outline >= -0.5) & (outline <= size - 0.5), axis=1)
     if mirror is not None:
         inside &= seen_in_mirror(
             X_WC[:3, 3], optics.disc_outline(center, normal, radius), mirror
         )
-    return MarkerView(uv, area, float(inside.mean()))
+    return MarkerImage(uv, area, float(inside.mean()))
 
 
-def seen_in_mirror(eye: Array, p_W: Array, mirror: Mirror) -> Array:
+def seen_in_mirror(eye: Array, p_W: Array, mirror: Mirror) -> Mask:
     """Whether the eye (3,) sees points (n, 3) within the mirror's face."""
     X_WM = mirror.X_WM
     image = optics.reflect_points(X_WM, p_W)

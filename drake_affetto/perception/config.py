@@ -252,7 +252,7 @@ class RenderConfig:
 
     Attributes:
         lights: the lights, fixed in the world.
-        background: colour behind everything, red, green and blue in [0, 1].
+        background: color behind everything, red, green and blue in [0, 1].
         cast_shadows: whether things throw shadows (slower).
     """
 

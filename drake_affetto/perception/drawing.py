@@ -8,11 +8,10 @@ import itertools
 import cv2
 import numpy as np
 
+from drake_affetto.common.typing import Array
 from drake_affetto.perception.blob import BlobCalibration
 
-Array = np.ndarray
-
-# RGB, told apart also in print and by most who see colours differently.
+# RGB, told apart also in print and by most who see colors differently.
 BLOB = (255, 0, 255)
 GRID = (0, 200, 255)
 WORKSPACE = (255, 220, 0)

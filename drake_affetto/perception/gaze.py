@@ -1,8 +1,8 @@
-"""Turning the upper body until the marker is centred, as a state machine.
+"""Turning the upper body until the marker is centered, as a state machine.
 
 The servo looks at a new image at the camera's rate. From the joint's angle q
 at the time of exposure and the marker's distance from the image's middle it
-takes the yaw at which the marker would be centred,
+takes the yaw at which the marker would be centered,
 
     q* = q - atan(e / f) / k,
 
@@ -23,14 +23,13 @@ import math
 import numpy as np
 
 from drake_affetto.common.errors import require, require_range
-
-Array = np.ndarray
+from drake_affetto.common.typing import Array
 
 
 class GazeMode(enum.IntEnum):
     """What the servo is to do."""
 
-    CENTRE = 0
+    CENTER = 0
     FIXED_YAW = 1
 
 
@@ -63,7 +62,7 @@ class GazeConfig:
         yaw_max: upper end [rad] of the search and of any command.
         tolerance: greatest distance of the marker from the middle.
         still: greatest speed of the marker in a still image [1/s].
-        settled_frames: images in a row that must be still and centred; τ is
+        settled_frames: images in a row that must be still and centered; τ is
             their mean.
         near_yaw: at a fixed yaw, how near [rad] the joint must be to it when
             τ is taken.
@@ -156,7 +155,7 @@ class GazeTask:
     """
 
     enabled: bool = True
-    mode: GazeMode = GazeMode.CENTRE
+    mode: GazeMode = GazeMode.CENTER
     fixed_yaw: float = 0.0
     start_yaw: float = 0.0
 
@@ -197,7 +196,7 @@ Q_SEEN = 10  # and the joint's angle then
 IMAGE_GAIN = 11  # k, as corrected on the way
 MISSED = 12  # images in a row without marker
 SWEEP = 13  # leg of the search
-COUNT = 14  # still and centred images in a row …
+COUNT = 14  # still and centered images in a row …
 SUM_1 = 15  # … and the sums of their τ
 SUM_2 = 16
 TAU_1 = 17
@@ -295,7 +294,7 @@ class Gaze:
         if task.mode == GazeMode.FIXED_YAW:
             self._look_from_fixed_yaw(x, t, blob, q, t_image, task)
         else:
-            self._centre(x, t, blob, q, t_image, task)
+            self._center(x, t, blob, q, t_image, task)
         x[T_YAW], x[Q_LAST] = t_image, q
         if (
             x[PHASE] in (GazePhase.TRACK, GazePhase.SEARCH)
@@ -343,7 +342,7 @@ class Gaze:
             blob[1] + x[SLOPE_Y] * behind,
         )
 
-    def _centre(
+    def _center(
         self,
         x: Array,
         t: float,
@@ -371,17 +370,17 @@ class Gaze:
         self._learn_image_gain(x, blob, q)
         # Turning left (+) moves the marker right: too far right, turn right.
         way = -math.atan(error / self.view.focal) / x[IMAGE_GAIN]
-        centred = abs(error) <= config.tolerance * self.view.width
-        centred_yaw = q + way
+        centered = abs(error) <= config.tolerance * self.view.width
+        centered_yaw = q + way
         if math.isfinite(x[T_LAST]):
             elapsed = t_image - x[T_LAST]
             self._overcome_friction(x, way, elapsed, still)
         self._remember(x, blob, q, t_image)
-        step = config.gain * way if not centred else way
+        step = config.gain * way if not centered else way
         self._go_to(x, t, task, q + step + x[OFFSET], config.max_speed)
         # Both as they would be, were the marker exactly in the middle.
-        y_centred = blob[1] + x[SLOPE_Y] * way
-        self._count(x, t, task, centred and still, y_centred, centred_yaw)
+        y_centered = blob[1] + x[SLOPE_Y] * way
+        self._count(x, t, task, centered and still, y_centered, centered_yaw)
 
     # Steps
 

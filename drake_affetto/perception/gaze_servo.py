@@ -32,7 +32,7 @@ def gaze_view(camera: Camera, calibration: BlobCalibration) -> GazeView:
     """How the calibrated blob coordinates lie in a camera's image."""
     unit_x = calibration.u_max - calibration.u_min
     unit_y = calibration.v_max - calibration.v_min
-    center = calibration.normalise(camera.image_center)
+    center = calibration.normalize(camera.image_center)
     return GazeView(
         center_x=float(center[0]),
         width=camera.width / unit_x,
@@ -42,7 +42,7 @@ def gaze_view(camera: Camera, calibration: BlobCalibration) -> GazeView:
 
 
 class GazeServo(LeafSystem):
-    """Turns the upper body's yaw until the marker is centred; gives τ.
+    """Turns the upper body's yaw until the marker is centered; gives τ.
 
     .. pydrake_system::
 
@@ -60,7 +60,7 @@ class GazeServo(LeafSystem):
     - blob (3): x_img, y_img, found.
     - estimated_state (2n): [q; q̇] of the active joints [rad, rad/s].
     - yaw_command (1): where the yaw joint should be [rad], without jumps.
-    - task_parameter (2): [y_img, q₃*] if the marker was centred, [x_img,
+    - task_parameter (2): [y_img, q₃*] if the marker was centered, [x_img,
       y_img] at a fixed yaw; zeros until settled is 1.
     - settled (1): 1 once τ is known, else 0.
     - failed (1): 1 once the marker is given up, else 0.
@@ -218,7 +218,7 @@ class GazeServo(LeafSystem):
         self.set_task(context, task)
 
     def set_mode(self, context: Context, mode: GazeMode) -> None:
-        """Centre the marker, or look from a fixed yaw."""
+        """Center the marker, or look from a fixed yaw."""
         task = self.task(context)
         task.mode = GazeMode(mode)
         self.set_task(context, task)

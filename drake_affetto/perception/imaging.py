@@ -1,4 +1,4 @@
-"""What a real sensor does to an ideal image: exposure, colour, blur, noise.
+"""What a real sensor does to an ideal image: exposure, color, blur, noise.
 
 Images are uint8 arrays (height, width, 3) in RGB.
 """
@@ -9,7 +9,7 @@ import math
 import cv2
 import numpy as np
 
-Array = np.ndarray
+from drake_affetto.common.typing import Image
 
 # The encoding that display images have, for gains that act on light.
 _GAMMA = 2.2
@@ -38,7 +38,7 @@ class ImageEffects:
         default_factory=lambda: [0.0, 0.0]
     )
 
-    def to_vector(self) -> Array:
+    def to_vector(self) -> Image:
         """The seven numbers (7,) that a context keeps as a parameter."""
         return np.array(
             [
@@ -51,13 +51,13 @@ class ImageEffects:
         )
 
     @classmethod
-    def from_vector(cls, vector: Array) -> "ImageEffects":
+    def from_vector(cls, vector: Image) -> "ImageEffects":
         """The inverse of `to_vector`."""
         v = [float(number) for number in vector]
         return cls(v[0], v[1:4], v[4], v[5:7])
 
 
-def gain_tables(exposure: float, white_balance: list[float]) -> Array:
+def gain_tables(exposure: float, white_balance: list[float]) -> Image:
     """Look-up tables (256, 3) of uint8 for a gain of the light."""
     light = (np.arange(256) / 255.0) ** _GAMMA
     gains = 2.0**exposure * np.asarray(white_balance, dtype=float)
@@ -65,7 +65,7 @@ def gain_tables(exposure: float, white_balance: list[float]) -> Array:
     return np.clip(np.rint(encoded), 0, 255).astype(np.uint8)
 
 
-def motion_blur_kernel(way: list[float]) -> Array | None:
+def motion_blur_kernel(way: list[float]) -> Image | None:
     """Kernel of a straight blur along `way` (u, v) [pixels]; None if short."""
     length = math.hypot(*way)
     if length < 0.5:
@@ -73,7 +73,7 @@ def motion_blur_kernel(way: list[float]) -> Array | None:
     reach = math.ceil(0.5 * length) + 1
     size = 2 * reach + 1
     kernel = np.zeros((size, size), dtype=np.float32)
-    # Points along the way, each shared among its four neighbours.
+    # Points along the way, each shared among its four neighbors.
     for s in np.linspace(-0.5, 0.5, max(9, 4 * size)):
         u, v = reach + s * way[0], reach + s * way[1]
         i, j = math.floor(v), math.floor(u)
@@ -89,9 +89,9 @@ class NoiseBank:
     """Reproducible pixel noise: the same (seed, time) gives the same noise."""
 
     def __init__(self) -> None:
-        self._bank: Array | None = None
+        self._bank: Image | None = None
 
-    def add(self, image: Array, sd: float, seed: int, time: float) -> Array:
+    def add(self, image: Image, sd: float, seed: int, time: float) -> Image:
         """A copy of `image` with normal noise of `sd` levels added."""
         if self._bank is None:
             rng = np.random.default_rng(20180521)
@@ -109,12 +109,12 @@ class NoiseBank:
 
 
 def apply_effects(
-    image: Array,
+    image: Image,
     effects: ImageEffects,
     noise_bank: NoiseBank | None = None,
     seed: int = 0,
     time: float = 0.0,
-) -> Array:
+) -> Image:
     """The image that a sensor with these `effects` gives; may be `image`."""
     kernel = motion_blur_kernel(effects.motion_blur)
     if kernel is not None:
@@ -129,9 +129,9 @@ def apply_effects(
 
 
 def composite_mirror(
-    image: Array,
-    reflection: Array,
-    mask: Array,
+    image: Image,
+    reflection: Image,
+    mask: Image,
     tint: list[float],
     blur: float,
 ) -> None:

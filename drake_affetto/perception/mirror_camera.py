@@ -124,7 +124,7 @@ class Sight:
 
 
 class MirrorCamera(LeafSystem):
-    """A colour and label camera that sees reflections in planar mirrors.
+    """A color and label camera that sees reflections in planar mirrors.
 
     .. pydrake_system::
 

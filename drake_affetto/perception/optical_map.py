@@ -3,7 +3,7 @@
 What is not known is the mirror's plane, three numbers; the camera, its joint
 and the height of the marker are given. A pixel of the mirrored marker is a ray;
 reflected in the plane it meets the marker's level at a place on the table;
-from there the direct view follows: the yaw that centres the marker, and the
+from there the direct view follows: the yaw that centers the marker, and the
 height at which it then is in the image.
 """
 
@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from drake_affetto.common.typing import Array
 from drake_affetto.geometry import optics
 from drake_affetto.perception.blob import BlobCalibration
-from drake_affetto.perception.camera_model import SightModel, turn_points
-
-Array = np.ndarray
+from drake_affetto.perception.camera_model import CameraModel, turn_points
 
 # Rays that hardly fall are taken to fall this steeply, so that a search that
 # strays meets a level far away rather than nowhere.
@@ -42,10 +41,10 @@ class OpticalMap:
         source_calibration: of y_img there.
     """
 
-    target: SightModel
+    target: CameraModel
     target_calibration: BlobCalibration
     yaw: float
-    source: SightModel
+    source: CameraModel
     source_calibration: BlobCalibration
 
     def count(self, n_in: int, n_out: int) -> int:
@@ -175,8 +174,8 @@ class OpticalMap:
         eye, ray = self._rays(np.asarray(X, dtype=float))
         p, d_p = self._reflect(parameters, eye, ray)
         source = self.source
-        yaw = source.centring_yaw(p)
-        # Where nothing centres it the nearest that can be said is the bearing.
+        yaw = source.centering_yaw(p)
+        # Where nothing centers it the nearest that can be said is the bearing.
         p_A = optics.transform_points(optics.invert_pose(source.X_WA), p)
         yaw = np.where(np.isfinite(yaw), yaw, np.arctan2(p_A[:, 1], p_A[:, 0]))
         turned = turn_points(source.axis, -yaw, p_A)

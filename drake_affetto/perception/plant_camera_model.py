@@ -10,7 +10,7 @@ from pydrake.systems.framework import Context
 
 from drake_affetto.common.errors import InputError
 from drake_affetto.perception.blob import BlobCalibration, calibrate
-from drake_affetto.perception.camera_model import Mirror, SightModel
+from drake_affetto.perception.camera_model import CameraModel, Mirror
 from drake_affetto.perception.config import CameraConfig
 from drake_affetto.perception.mirror_camera import MirrorCamera, find_frame
 from drake_affetto.scene import world
@@ -34,12 +34,12 @@ def marker_radius(
     raise InputError("the drum's model has no visual cylinder named 'marker'")
 
 
-def make_sight_model(
+def make_camera_model(
     plant: MultibodyPlant,
     context: Context,
     config: CameraConfig,
     yaw_joint: str,
-) -> SightModel:
+) -> CameraModel:
     """The sight model at the posture and drum height of a plant's context.
 
     Args:
@@ -51,7 +51,7 @@ def make_sight_model(
     """
     frame = find_frame(plant, config.frame)
     query: Any = plant.get_geometry_query_input_port().Eval(context)
-    return SightModel.from_chain(
+    return CameraModel.from_chain(
         config.model(),
         world.serial_chain(plant, frame.name()),
         yaw_joint,
@@ -71,7 +71,7 @@ def mirrors_in_world(camera: MirrorCamera, context: Context) -> list[Mirror]:
 
 
 def calibrate_view(
-    sight: SightModel,
+    sight: CameraModel,
     positions: np.ndarray,
     fixed_yaw: float | None = None,
     mirrors: Sequence[Mirror] = (),
@@ -82,7 +82,7 @@ def calibrate_view(
     Args:
         sight: the geometry of seeing.
         positions: where the drum may stand, x and y in W [m].
-        fixed_yaw: the yaw [rad] to look from; None to centre the marker, and
+        fixed_yaw: the yaw [rad] to look from; None to center the marker, and
             then x spans the whole image.
         mirrors: in which the marker may be seen.
         margin: what to add on each side, as a fraction of the box.

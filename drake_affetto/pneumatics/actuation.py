@@ -244,7 +244,7 @@ class PneumaticActuation(LeafSystem):
     def set_parameters(
         self, context: Context, parameters: NDArray[np.float64]
     ) -> None:
-        """Changes the actuators, for instance for a randomised trial.
+        """Changes the actuators, for instance for a randomized trial.
 
         Raises:
             InputError: for another shape, or a dead time longer than the one

@@ -35,7 +35,7 @@ joint (a true stick phase, without creep) until the torque reaches
 
 beyond which they slip. What they give back is only what they stored: friction
 never drives. (Dupont et al., IEEE Trans. Automatic Control 47(5), 2002.) F_d
-is what a seal has more after a long rest: λ falls from 1 with the travelled
+is what a seal has more after a long rest: λ falls from 1 with the traveled
 angle s, dλ = -λ ds/s_d, and returns at rest, dλ = (1 - λ) dt/t_d. The viscous
 part is not here: it is the joint's damping in the robot's SDF, which the
 plant integrates implicitly.

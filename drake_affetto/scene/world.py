@@ -117,7 +117,7 @@ class WorldConfig:
             len(self.drum_position) == 2,
             f"{where}.drum_position",
             self.drum_position,
-            "two numbers (x and y in metres)",
+            "two numbers (x and y in meters)",
         )
         for i, value in enumerate(self.drum_position):
             require_range(f"{where}.drum_position[{i}]", value, -10, 10)
@@ -447,7 +447,7 @@ def hand_radius(plant: MultibodyPlant, context: Context) -> float:
 
 
 def marker_radius(plant: MultibodyPlant, context: Context) -> float:
-    """Radius [m] of the coloured disc on the drum's head."""
+    """Radius [m] of the colored disc on the drum's head."""
     body = plant.GetFrameByName("marker").body()
     shapes = _shapes(plant, context, body, Cylinder, Role.kPerception, "marker")
     return shapes[0][1].radius()
@@ -482,7 +482,7 @@ def set_drum_position(
         place.shape == (2,) and bool(np.all(np.isfinite(place))),
         "drum position",
         place.tolist(),
-        "two finite numbers (x and y in metres)",
+        "two finite numbers (x and y in meters)",
     )
     low, high = drum_limits(plant, context)
     require(
@@ -504,13 +504,13 @@ def get_drum_position(plant: MultibodyPlant, context: Context) -> np.ndarray:
 
 
 def marker_position(plant: MultibodyPlant, context: Context) -> np.ndarray:
-    """World position [m] of the centre of the drum's marker, (3,)."""
+    """World position [m] of the center of the drum's marker, (3,)."""
     frame = plant.GetFrameByName("marker")
     return frame.CalcPoseInWorld(context).translation()
 
 
 def head_center_position(plant: MultibodyPlant, context: Context) -> np.ndarray:
-    """World position [m] of the top centre of the drum's head, (3,)."""
+    """World position [m] of the top center of the drum's head, (3,)."""
     frame = plant.GetFrameByName("head_center")
     return frame.CalcPoseInWorld(context).translation()
 

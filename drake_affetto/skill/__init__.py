@@ -1,4 +1,4 @@
-"""The parameterised skill (an ELM) and its transfer to a new view."""
+"""The parameterized skill (an ELM) and its transfer to a new view."""
 
 from drake_affetto.common.lazy import attach
 

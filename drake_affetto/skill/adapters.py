@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.frozen import FrozenEstimator
 from sklearn.gaussian_process import GaussianProcessRegressor, kernels
 from sklearn.kernel_ridge import KernelRidge
@@ -21,13 +21,12 @@ from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import MinMaxScaler, StandardScaler
 from sklearn.utils.validation import check_is_fitted
 
+from drake_affetto.common.typing import Array
 from drake_affetto.skill.elm import ElmRegressor
 from drake_affetto.skill.mappings import Domain
 
-FloatArray = NDArray[np.float64]
-
 # Predictions (M, F) and their input Jacobian (M, F, d) at Z (M, d).
-Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+Evaluate = Callable[[Array], tuple[Array, Array]]
 
 
 class SourceModel:
@@ -55,10 +54,10 @@ class SourceModel:
         self.exact = exact
         self.flat = flat
 
-    def project(self, matrix: FloatArray) -> "SourceModel":
+    def project(self, matrix: Array) -> "SourceModel":
         """The model of ŷ · matrix, for a matrix (F, r)."""
 
-        def evaluate(Z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        def evaluate(Z: Array) -> tuple[Array, Array]:
             value, jacobian = self.evaluate(Z)
             return value @ matrix, np.swapaxes(
                 np.swapaxes(jacobian, 1, 2) @ matrix, 1, 2
@@ -66,7 +65,7 @@ class SourceModel:
 
         return SourceModel(evaluate, self.n_in, matrix.shape[1], self.exact)
 
-    def output_basis(self) -> FloatArray | None:
+    def output_basis(self) -> Array | None:
         """(F, r), orthonormal columns that span ŷ; None if not known."""
         return None
 
@@ -80,7 +79,7 @@ class ElmSource(SourceModel):
         self._coef = np.ascontiguousarray(coef)
         super().__init__(self._evaluate, weights.shape[0], coef.shape[1])
 
-    def _evaluate(self, Z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _evaluate(self, Z: Array) -> tuple[Array, Array]:
         phi = Z @ self._weights
         phi += self._biases
         # tanh is several times faster than expit.
@@ -95,11 +94,11 @@ class ElmSource(SourceModel):
         product = stacked @ self._coef
         return product[0], np.moveaxis(product[1:], 0, 2)
 
-    def project(self, matrix: FloatArray) -> "SourceModel":
+    def project(self, matrix: Array) -> "SourceModel":
         """See base class."""
         return ElmSource(self._weights, self._biases, self._coef @ matrix)
 
-    def output_basis(self) -> FloatArray | None:
+    def output_basis(self) -> Array | None:
         """See base class."""
         if self._coef.shape[1] <= 2:
             return None
@@ -114,7 +113,7 @@ def source_model(estimator: Any) -> SourceModel:
     Raises:
         NotFittedError: if it has not been fitted.
     """
-    estimator = unfrozen(estimator)
+    estimator = unwrap_frozen(estimator)
     check_is_fitted(estimator)
     if isinstance(estimator, ElmRegressor):
         weights = estimator.input_gain_[:, None] * estimator.input_weights_
@@ -160,7 +159,7 @@ def _evaluate_exactly(estimator: Any, n_in: int, n_out: int) -> Evaluate | None:
     return None
 
 
-def input_jacobian(estimator: Any, X: ArrayLike) -> FloatArray:
+def input_jacobian(estimator: Any, X: ArrayLike) -> Array:
     """∂ŷ/∂x (N, F, d) of any fitted regressor at X (N, d).
 
     Raises:
@@ -171,7 +170,7 @@ def input_jacobian(estimator: Any, X: ArrayLike) -> FloatArray:
 
 def source_domain(estimator: Any) -> Domain | None:
     """Where a fitted regressor's training inputs lay, if it remembers."""
-    estimator = unfrozen(estimator)
+    estimator = unwrap_frozen(estimator)
     if isinstance(estimator, ElmRegressor):
         return Domain(
             estimator.input_mean_,
@@ -186,20 +185,20 @@ def source_domain(estimator: Any) -> Domain | None:
     return None
 
 
-def unfrozen(estimator: Any) -> Any:
+def unwrap_frozen(estimator: Any) -> Any:
     """What is inside scikit-learn's FrozenEstimator, or the thing itself."""
     while isinstance(estimator, FrozenEstimator):
         estimator = estimator.estimator
     return estimator
 
 
-def _rows(values: Any) -> FloatArray:
+def _rows(values: Any) -> Array:
     values = np.asarray(values, dtype=float)
     return values[:, None] if values.ndim == 1 else values
 
 
 def _evaluate_own(estimator: Any) -> Evaluate:
-    def evaluate(Z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def evaluate(Z: Array) -> tuple[Array, Array]:
         value = np.asarray(estimator.predict(Z))
         jacobian = np.asarray(estimator.input_jacobian(Z))
         return _rows(value), jacobian.reshape(len(Z), -1, Z.shape[1])
@@ -207,8 +206,8 @@ def _evaluate_own(estimator: Any) -> Evaluate:
     return evaluate
 
 
-def _evaluate_linear(coef: FloatArray, intercept: Any) -> Evaluate:
-    def evaluate(Z: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _evaluate_linear(coef: Array, intercept: Any) -> Evaluate:
+    def evaluate(Z: Array) -> tuple[Array, Array]:
         value = Z @ coef.T + intercept
         return value, np.broadcast_to(coef, (len(Z), *coef.shape))
 
@@ -216,7 +215,7 @@ def _evaluate_linear(coef: FloatArray, intercept: Any) -> Evaluate:
 
 
 def _evaluate_numerically(estimator: Any) -> Evaluate:
-    def evaluate(Z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def evaluate(Z: Array) -> tuple[Array, Array]:
         n, d = Z.shape
         # A cube root of rounding balances it against the cubic error.
         step = 6e-6 * np.maximum(1.0, np.abs(Z).max(axis=0, initial=0.0))
@@ -246,7 +245,7 @@ def _evaluate_mlp(estimator: Any) -> Evaluate | None:
     activate = activations[estimator.activation]
     slope = slopes[estimator.activation]
 
-    def evaluate(Z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def evaluate(Z: Array) -> tuple[Array, Array]:
         layer = Z
         # ∂layer/∂z, (M, d, units)
         chain = np.broadcast_to(np.eye(Z.shape[1]), (len(Z), *[Z.shape[1]] * 2))
@@ -288,21 +287,19 @@ def _evaluate_gaussian_process(estimator: Any) -> Evaluate | None:
     if evaluate is None:
         return None
 
-    def shifted(Z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def shifted(Z: Array) -> tuple[Array, Array]:
         value, jacobian = evaluate(Z)
         return value + mean, jacobian
 
     return shifted
 
 
-def _evaluate_kernel(
-    kernel: Any, data: FloatArray, dual: FloatArray
-) -> Evaluate | None:
+def _evaluate_kernel(kernel: Any, data: Array, dual: Array) -> Evaluate | None:
     """Σ_n k(z, x_n) α_n, if the kernel's derivative is known."""
     if _kernel_slope(kernel, data[:1], data[:1]) is None:
         return None
 
-    def evaluate(Z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def evaluate(Z: Array) -> tuple[Array, Array]:
         known = _kernel_slope(kernel, Z, data)
         assert known is not None
         value, slope = known
@@ -312,8 +309,8 @@ def _evaluate_kernel(
 
 
 def _kernel_slope(
-    kernel: Any, Z: FloatArray, data: FloatArray
-) -> tuple[FloatArray, FloatArray] | None:
+    kernel: Any, Z: Array, data: Array
+) -> tuple[Array, Array] | None:
     """k(z, x) (M, N) and ∂k/∂z (M, N, d), or None if not known here."""
     if isinstance(kernel, (kernels.Sum, kernels.Product)):
         first = _kernel_slope(kernel.k1, Z, data)
@@ -362,7 +359,7 @@ def _evaluate_pipeline(estimator: Any) -> Evaluate | None:
     # Scalers are affine, and act on each input by itself.
     gain = np.diag(moved[1:] - moved[0])
 
-    def evaluate(Z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def evaluate(Z: Array) -> tuple[Array, Array]:
         value, jacobian = inner.evaluate(moved[0] + gain * Z)
         return value, jacobian * gain
 

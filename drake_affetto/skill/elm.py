@@ -5,7 +5,7 @@ Schulz et al. 2018):
 
     ŷ(x) = Wᵀ φ(x),    φ(x) = σ(Vᵀ x̄ + b),
 
-with x̄ the input scaled to its range. The read-out W minimises the squared
+with x̄ the input scaled to its range. The read-out W minimizes the squared
 error plus α ‖W‖² (Eq. 4). It is found recursively: what has been learned is
 kept as a square root of the information matrix, which a new sample updates by
 an orthogonal transformation. So the order of the samples does not matter, and
@@ -16,7 +16,7 @@ leaves of a sample's outputs tells, beside, how well they could be predicted.
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import solve_triangular
 from scipy.linalg.blas import dsyrk
 from scipy.linalg.lapack import dtpmqrt, dtpqrt, dtrtrs
@@ -25,7 +25,7 @@ from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
 from sklearn.utils import check_random_state
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-FloatArray = NDArray[np.float64]
+from drake_affetto.common.typing import Array
 
 # Samples that are transformed together: bounds the memory, not the result.
 _CHUNK = 1024
@@ -67,7 +67,7 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
     """
 
     # Of the present R and z, as soon as it is asked for.
-    _coef: FloatArray | None
+    _coef: Array | None
 
     def __init__(
         self,
@@ -126,17 +126,17 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         self._learn(X, y)
         return self
 
-    def predict(self, X: ArrayLike) -> FloatArray:
+    def predict(self, X: ArrayLike) -> Array:
         """ŷ (N, F), or (N,) if y was one-dimensional, for X (N, d)."""
         return self.hidden(X) @ self.coef_
 
-    def hidden(self, X: ArrayLike) -> FloatArray:
+    def hidden(self, X: ArrayLike) -> Array:
         """φ (N, H), the activation of the hidden layer, for X (N, d)."""
         check_is_fitted(self)
         checked = validate_data(self, X, reset=False, dtype=np.float64)
         return self._activate(np.asarray(checked))
 
-    def input_jacobian(self, X: ArrayLike) -> FloatArray:
+    def input_jacobian(self, X: ArrayLike) -> Array:
         """∂ŷ/∂x (N, F, d), or (N, d) if y was one-dimensional, at X (N, d)."""
         phi = self.hidden(X)
         slope = phi * (1.0 - phi)
@@ -149,7 +149,7 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
             jacobian[:, :, i] = (slope * row) @ self.coef_
         return jacobian
 
-    def loo_residuals(self, X: ArrayLike, y: ArrayLike) -> FloatArray:
+    def loo_residuals(self, X: ArrayLike, y: ArrayLike) -> Array:
         """What each learned sample would be missed by, had it been left out.
 
         Exact for the samples that the regressor has learned with
@@ -170,7 +170,7 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         free = np.maximum(free, 1e-12)
         return residuals / (free if y.ndim == 1 else free[:, None])
 
-    def leverage(self, X: ArrayLike) -> FloatArray:
+    def leverage(self, X: ArrayLike) -> Array:
         """φᵀ (ΦᵀΦ + α I)⁻¹ φ (N,) at X (N, d).
 
         A prediction there has an error of covariance
@@ -181,7 +181,7 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         return np.einsum("hn,hn->n", half, half)
 
     @property
-    def error_covariance_(self) -> FloatArray:
+    def error_covariance_(self) -> Array:
         """(F, F); see the class.
 
         The read-out's prior being that of the ridge, this is the covariance
@@ -197,14 +197,14 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         return (upper + np.triu(upper, 1).T) / self._weight_seen
 
     @property
-    def coef_(self) -> FloatArray:
+    def coef_(self) -> Array:
         """The read-out W, (H, F) or (H,)."""
         check_is_fitted(self)
         return self._read_out()
 
     def _validate(
         self, X: ArrayLike, y: ArrayLike, *, reset: bool
-    ) -> tuple[FloatArray, FloatArray]:
+    ) -> tuple[Array, Array]:
         checked, targets = validate_data(
             self,
             X,
@@ -216,7 +216,7 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         )
         return np.asarray(checked), np.asarray(targets, dtype=np.float64)
 
-    def _begin(self, n_features: int, y: FloatArray) -> None:
+    def _begin(self, n_features: int, y: Array) -> None:
         """Draws the hidden layer and lays out an empty memory."""
         self._check_parameters()
         self.input_center_, self.input_gain_ = _scaling(
@@ -266,11 +266,11 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
                     + (f" and at most {high:g}" if high < np.inf else "")
                 )
 
-    def _activate(self, X: FloatArray) -> FloatArray:
+    def _activate(self, X: Array) -> Array:
         scaled = (X - self.input_center_) * self.input_gain_
         return expit(scaled @ self.input_weights_ + self.biases_)
 
-    def _learn(self, X: FloatArray, y: FloatArray) -> None:
+    def _learn(self, X: Array, y: Array) -> None:
         y = y.reshape(len(X), -1)
         for begin in range(0, len(X), _CHUNK):
             rows = slice(begin, begin + _CHUNK)
@@ -278,7 +278,7 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         self._note_inputs(X)
         self._coef = None
 
-    def _note_inputs(self, X: FloatArray) -> None:
+    def _note_inputs(self, X: Array) -> None:
         """Keeps the moments and limits of the inputs learned so far."""
         known, new = self.n_samples_seen_, len(X)
         total = known + new
@@ -295,7 +295,7 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         self.input_high_ = np.maximum(self.input_high_, X.max(axis=0))
         self.n_samples_seen_ = total
 
-    def _absorb(self, phi: FloatArray, y: FloatArray) -> None:
+    def _absorb(self, phi: Array, y: Array) -> None:
         """Updates R and z by the rows phi (N, H) and y (N, F)."""
         n = len(phi)
         kept = self.forgetting**n
@@ -337,12 +337,12 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
             moment = moment[:, 0].copy().reshape(-1, 1)
         self._moment = moment
 
-    def _read_out(self) -> FloatArray:
+    def _read_out(self) -> Array:
         if self._coef is None:
             self._coef = self._solve()
         return self._coef
 
-    def _solve(self) -> FloatArray:
+    def _solve(self) -> Array:
         coef, _ = dtrtrs(self._root, self._moment)
         return coef[:, 0] if self._y_ndim == 1 else coef
 
@@ -354,7 +354,7 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
 
 def _scaling(
     input_range: ArrayLike | None, n_features: int
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[Array, Array]:
     """Center and gain (d,) that take the range to [-1, 1]."""
     if input_range is None:
         return np.zeros(n_features), np.ones(n_features)

@@ -19,9 +19,9 @@ import math
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from drake_affetto.common.typing import Array
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,10 +35,10 @@ class Domain:
         high: (d,), the greatest.
     """
 
-    mean: FloatArray
-    covariance: FloatArray
-    low: FloatArray
-    high: FloatArray
+    mean: Array
+    covariance: Array
+    low: Array
+    high: Array
 
     @classmethod
     def of_samples(cls, X: ArrayLike) -> Self:
@@ -61,7 +61,7 @@ class Domain:
         )
 
     @functools.cached_property
-    def deviation(self) -> FloatArray:
+    def deviation(self) -> Array:
         """(d,), standard deviation of each input; 1 where it is 0."""
         deviation = np.sqrt(np.diag(self.covariance))
         return np.where(deviation > 1e-12, deviation, 1.0)
@@ -79,11 +79,11 @@ class Mapping(abc.ABC):
         return self.count(n_in, n_out)
 
     @abc.abstractmethod
-    def apply(self, parameters: FloatArray, X: FloatArray) -> FloatArray:
+    def apply(self, parameters: Array, X: Array) -> Array:
         """h(X): parameters (P,), X (N, n_in) to (N, n_out)."""
 
     @abc.abstractmethod
-    def derivative(self, parameters: FloatArray, X: FloatArray) -> FloatArray:
+    def derivative(self, parameters: Array, X: Array) -> Array:
         """∂h/∂p at X: parameters (P,), X (N, n_in) to (N, n_out, P)."""
 
     @abc.abstractmethod
@@ -93,7 +93,7 @@ class Mapping(abc.ABC):
         source: Domain,
         n_starts: int,
         random: np.random.RandomState,
-    ) -> list[tuple[str, FloatArray]]:
+    ) -> list[tuple[str, Array]]:
         """At most n_starts named parameters (P,) to begin a search from.
 
         Args:
@@ -103,13 +103,11 @@ class Mapping(abc.ABC):
             random: for those that are drawn.
         """
 
-    def apply_many(self, parameters: FloatArray, X: FloatArray) -> FloatArray:
+    def apply_many(self, parameters: Array, X: Array) -> Array:
         """`apply` for parameters (S, P): (S, N, n_out)."""
         return np.array([self.apply(row, X) for row in parameters])
 
-    def derivative_many(
-        self, parameters: FloatArray, X: FloatArray
-    ) -> FloatArray:
+    def derivative_many(self, parameters: Array, X: Array) -> Array:
         """`derivative` for parameters (S, P): (S, N, n_out, P)."""
         return np.array([self.derivative(row, X) for row in parameters])
 
@@ -121,22 +119,20 @@ class Affine(Mapping):
         """See base class."""
         return n_out * (n_in + 1)
 
-    def apply(self, parameters: FloatArray, X: FloatArray) -> FloatArray:
+    def apply(self, parameters: Array, X: Array) -> Array:
         """See base class."""
         return self.apply_many(parameters[None], X)[0]
 
-    def derivative(self, parameters: FloatArray, X: FloatArray) -> FloatArray:
+    def derivative(self, parameters: Array, X: Array) -> Array:
         """See base class."""
         return self.derivative_many(parameters[None], X)[0]
 
-    def apply_many(self, parameters: FloatArray, X: FloatArray) -> FloatArray:
+    def apply_many(self, parameters: Array, X: Array) -> Array:
         """See base class."""
         linear, offset = self.split(parameters, X.shape[1])
         return X @ np.swapaxes(linear, 1, 2) + offset[:, None]
 
-    def derivative_many(
-        self, parameters: FloatArray, X: FloatArray
-    ) -> FloatArray:
+    def derivative_many(self, parameters: Array, X: Array) -> Array:
         """See base class."""
         n, n_in = X.shape
         n_out = parameters.shape[1] // (n_in + 1)
@@ -147,9 +143,7 @@ class Affine(Mapping):
         # h is linear in p: the same for all of them.
         return np.broadcast_to(one, (len(parameters), *one.shape))
 
-    def split(
-        self, parameters: FloatArray, n_in: int
-    ) -> tuple[FloatArray, FloatArray]:
+    def split(self, parameters: Array, n_in: int) -> tuple[Array, Array]:
         """p (..., P) to H (..., n_out, n_in) and c (..., n_out)."""
         n_out = parameters.shape[-1] // (n_in + 1)
         linear = parameters[..., : n_out * n_in]
@@ -164,7 +158,7 @@ class Affine(Mapping):
         source: Domain,
         n_starts: int,
         random: np.random.RandomState,
-    ) -> list[tuple[str, FloatArray]]:
+    ) -> list[tuple[str, Array]]:
         """The identity; then maps that take one domain onto the other.
 
         Those map mean to mean and deviation to deviation, with axes that are
@@ -199,16 +193,16 @@ class Similarity(Mapping):
         """See base class."""
         return 4
 
-    def apply(self, parameters: FloatArray, X: FloatArray) -> FloatArray:
+    def apply(self, parameters: Array, X: Array) -> Array:
         """See base class."""
         return X @ self.linear(parameters).T + parameters[2:4]
 
-    def linear(self, parameters: FloatArray) -> FloatArray:
+    def linear(self, parameters: Array) -> Array:
         """H (2, 2)."""
         a, b, _, _, side = parameters
         return np.array([[a, -b * side], [b, a * side]])
 
-    def derivative(self, parameters: FloatArray, X: FloatArray) -> FloatArray:
+    def derivative(self, parameters: Array, X: Array) -> Array:
         """See base class."""
         side = parameters[4]
         result = np.zeros((len(X), 2, 5))
@@ -226,7 +220,7 @@ class Similarity(Mapping):
         source: Domain,
         n_starts: int,
         random: np.random.RandomState,
-    ) -> list[tuple[str, FloatArray]]:
+    ) -> list[tuple[str, Array]]:
         """The identity; then turns in even steps, with and without mirror."""
         named = [("identity", np.array([1.0, 0.0, 0.0, 0.0, 1.0]))]
         scale = math.sqrt(
@@ -278,7 +272,7 @@ def make_mapping(mapping: str | Mapping) -> Mapping:
 
 def _turns(
     n_in: int, n_out: int, count: int, random: np.random.RandomState
-) -> list[tuple[str, FloatArray]]:
+) -> list[tuple[str, Array]]:
     """At most `count` named matrices (n_out, n_in) with orthonormal rows."""
     eye = np.eye(n_out, n_in)
     turns = [("centered", eye)]

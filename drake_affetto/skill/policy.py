@@ -1,4 +1,4 @@
-"""The parameterised skill as a Drake system: from what is seen to θ."""
+"""The parameterized skill as a Drake system: from what is seen to θ."""
 
 import dataclasses
 import math

@@ -29,7 +29,7 @@ from drake_affetto.skill.scheme_names import SCHEMES
 from drake_affetto.skill.transfer import TransferRegressor
 
 
-class Unchanged(RegressorMixin, BaseEstimator):
+class NoTransfer(RegressorMixin, BaseEstimator):
     """The skill as it is, whatever samples there are.
 
     Args:
@@ -54,7 +54,7 @@ class Unchanged(RegressorMixin, BaseEstimator):
         return type(self)(self.estimator)
 
 
-class Continued(RegressorMixin, BaseEstimator):
+class FineTuned(RegressorMixin, BaseEstimator):
     """A copy of the skill that goes on learning, with what it already knows.
 
     Args:
@@ -126,9 +126,9 @@ def _gaussian_process(source: Any) -> Any:
 
 
 _MAKERS: dict[str, Callable[..., Any]] = {
-    "unchanged": Unchanged,
+    "unchanged": NoTransfer,
     "relearn": _relearn,
-    "continue": Continued,
+    "continue": FineTuned,
     "transfer": _paper,
     "transfer_default": TransferRegressor,
     "gaussian_process": _gaussian_process,

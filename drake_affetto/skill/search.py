@@ -1,7 +1,7 @@
 """The cost of a map, and searches for its parameters.
 
-What `TransferRegressor` minimises, with its derivatives, for many parameters
-at once; and two ways to minimise it.
+What `TransferRegressor` minimizes, with its derivatives, for many parameters
+at once; and two ways to minimize it.
 """
 
 from collections.abc import Callable
@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from drake_affetto.common.typing import Array
 from drake_affetto.skill.adapters import SourceModel
 from drake_affetto.skill.mappings import Affine, Domain, Mapping
 
-FloatArray = NDArray[np.float64]
-
 # Parameters (S, P) to cost (S,), half its gradient (S, P), and half its
 # Gauss-Newton Hessian (S, P, P).
-Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+Evaluate = Callable[[Array], tuple[Array, Array, Array]]
 
 # Iterations that make the best minimum exact.
 _POLISH = 20
@@ -55,26 +54,24 @@ class Objective:
         self,
         source: SourceModel,
         mapping: Mapping,
-        X: FloatArray,
-        y: FloatArray,
-        unlabelled: FloatArray,
+        X: Array,
+        y: Array,
+        unlabeled: Array,
         alpha: float,
         prior: Prior | None,
     ) -> None:
         self._source = source
         self._mapping = mapping
-        self._labelled = len(X)
-        self._points = np.concatenate([X, unlabelled]) if prior else X
+        self._labeled = len(X)
+        self._points = np.concatenate([X, unlabeled]) if prior else X
         self._y = y
         self._alpha = alpha
         self._prior = prior
 
-    def __call__(
-        self, parameters: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def __call__(self, parameters: Array) -> tuple[Array, Array, Array]:
         """For parameters (S, P): cost (S,), half its gradient (S, P), and
         half its Gauss-Newton Hessian (S, P, P)."""
-        mapping, n = self._mapping, self._labelled
+        mapping, n = self._mapping, self._labeled
         moved = mapping.apply_many(parameters, self._points)
         slope = mapping.derivative_many(parameters, self._points)
         n_starts, _, d = moved.shape
@@ -118,9 +115,7 @@ class Objective:
             curvature[:, range(size), range(size)] += self._alpha
         return cost, gradient, curvature
 
-    def _inside(
-        self, moved: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _inside(self, moved: Array) -> tuple[Array, Array, Array]:
         """The squared distance of each z from the domain's box."""
         assert self._prior is not None
         domain, weight = self._prior.domain, self._prior.inside
@@ -135,8 +130,8 @@ class Objective:
         return cost, pull, bend
 
     def _moments(
-        self, parameters: FloatArray, moved: FloatArray, slope: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+        self, parameters: Array, moved: Array, slope: Array
+    ) -> tuple[Array, Array]:
         """How unlikely mean and covariance of the z are in the domain.
 
         Returns:
@@ -170,8 +165,8 @@ class Objective:
         )
 
     def _distortion(
-        self, parameters: FloatArray, moved: FloatArray, slope: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+        self, parameters: Array, moved: Array, slope: Array
+    ) -> tuple[Array, Array]:
         """How far an affine map is from a similarity: HᵀH from a multiple of 1.
 
         Returns:
@@ -209,22 +204,22 @@ class Objective:
 
 
 class Minima(NamedTuple):
-    parameters: FloatArray  # (S, P)
-    cost: FloatArray  # (S,)
-    gradient: FloatArray  # (S, P), half of it
-    curvature: FloatArray  # (S, P, P), half of it
+    parameters: Array  # (S, P)
+    cost: Array  # (S,)
+    gradient: Array  # (S, P), half of it
+    curvature: Array  # (S, P, P), half of it
     converged: NDArray[np.bool_]  # (S,)
     iterations: int  # of the longest search
 
 
 def levenberg_marquardt(
     objective: Evaluate,
-    starts: FloatArray,
+    starts: Array,
     *,
     max_iter: int,
     tol: float,
 ) -> Minima:
-    """Minimises from all starts (S, P) at once.
+    """Minimizes from all starts (S, P) at once.
 
     Each start has its own damping, after Nielsen; those that have converged
     rest. A start has converged once no step is expected to lower its cost by
@@ -239,7 +234,7 @@ def levenberg_marquardt(
 
 
 def _descend(
-    objective: Evaluate, starts: FloatArray, max_iter: int, tol: float
+    objective: Evaluate, starts: Array, max_iter: int, tol: float
 ) -> Minima:
     """`levenberg_marquardt` without the last step."""
     parameters = np.array(starts, dtype=float)
@@ -288,14 +283,14 @@ def _descend(
 
 def bfgs(
     objective: Evaluate,
-    starts: FloatArray,
+    starts: Array,
     *,
     max_iter: int,
     tol: float,
 ) -> Minima:
-    """Minimises from one start after another by BFGS, as in the paper."""
+    """Minimizes from one start after another by BFGS, as in the paper."""
 
-    def cost_and_gradient(p: FloatArray) -> tuple[float, FloatArray]:
+    def cost_and_gradient(p: Array) -> tuple[float, Array]:
         cost, gradient, _ = objective(p[None])
         return float(cost[0]), 2.0 * gradient[0]
 

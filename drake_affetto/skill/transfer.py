@@ -40,11 +40,12 @@ from sklearn.utils.validation import (
     validate_data,
 )
 
+from drake_affetto.common.typing import Array
 from drake_affetto.skill.adapters import (
     SourceModel,
     source_domain,
     source_model,
-    unfrozen,
+    unwrap_frozen,
 )
 from drake_affetto.skill.elm import ElmRegressor
 from drake_affetto.skill.mappings import (
@@ -61,8 +62,6 @@ from drake_affetto.skill.search import (
     bfgs,
     levenberg_marquardt,
 )
-
-FloatArray = NDArray[np.float64]
 
 # Weights of the prior's terms relative to the squared error that is expected
 # of one output. Chosen on seeds of the toy experiment that are not reported.
@@ -96,8 +95,8 @@ class Start(NamedTuple):
     """
 
     name: str
-    initial: FloatArray
-    parameters: FloatArray
+    initial: Array
+    parameters: Array
     cost: float
     gradient_norm: float
     weight: float
@@ -125,7 +124,7 @@ class TransferRegressor(
             and an affine h is nearly a similarity, as between two cameras.
             "moments": all that, and the x are tasks drawn like those of the
             skill, so h(x) has their mean and covariance; for many x. "auto":
-            "moments" if there are unlabelled inputs, else "similar"; None if
+            "moments" if there are unlabeled inputs, else "similar"; None if
             it is not known where the skill was learned.
         noise: the error to be expected of the skill itself, relative to the
             standard deviation of its outputs. It scales prior and average.
@@ -200,14 +199,14 @@ class TransferRegressor(
         self,
         X: ArrayLike,
         y: ArrayLike,
-        X_unlabelled: ArrayLike | None = None,
+        X_unlabeled: ArrayLike | None = None,
     ) -> Self:
         """Finds h from samples X (N, n_features) with known outputs y (N, F).
 
         Args:
             X: (N, n_features), N at least 2.
             y: (N, F), or (N,) if the estimator predicts single numbers.
-            X_unlabelled: (M, n_features), further inputs whose outputs are
+            X_unlabeled: (M, n_features), further inputs whose outputs are
                 not known, of tasks like those of the skill.
 
         Raises:
@@ -216,22 +215,22 @@ class TransferRegressor(
         """
         self._check_parameters()
         source = source_model(self.estimator)
-        X, targets, unlabelled = self._validate(X, y, X_unlabelled, source)
+        X, targets, unlabeled = self._validate(X, y, X_unlabeled, source)
         mapping = make_mapping(self.mapping)
         n_in = X.shape[1]
         mapping.count(n_in, source.n_in)
         self._warn_of_freedom(mapping, source, len(X), n_in)
 
         domain = self._source_domain(source)
-        target = Domain.of_samples(np.concatenate([X, unlabelled]))
+        target = Domain.of_samples(np.concatenate([X, unlabeled]))
         reduced, wanted, rest, noise = self._whiten(source, targets, domain)
-        kind = self._prior_kind(mapping, domain, n_in, source.n_in, unlabelled)
+        kind = self._prior_kind(mapping, domain, n_in, source.n_in, unlabeled)
         prior = _make_prior(kind, domain, target, noise)
         alpha = self.alpha
         if alpha is None:
             alpha = _PLAIN_ALPHA if prior is None else 0.0
         objective = Objective(
-            reduced, mapping, X, wanted, unlabelled, float(alpha), prior
+            reduced, mapping, X, wanted, unlabeled, float(alpha), prior
         )
         # Where nothing is known of the skill's inputs, assume those of now.
         assumed = domain
@@ -255,7 +254,7 @@ class TransferRegressor(
         self._fit_residual(X, targets)
         return self
 
-    def predict(self, X: ArrayLike) -> FloatArray:
+    def predict(self, X: ArrayLike) -> Array:
         """f(h(X)) (N, F), or (N,) as the estimator has it, for X."""
         check_is_fitted(self)
         X = np.asarray(validate_data(self, X, reset=False, dtype=np.float64))
@@ -268,7 +267,7 @@ class TransferRegressor(
             value += self.residual_.predict(X).reshape(value.shape)
         return value
 
-    def transform(self, X: ArrayLike) -> FloatArray:
+    def transform(self, X: ArrayLike) -> Array:
         """h(X) (N, d), with the best minimum's parameters, for X."""
         check_is_fitted(self)
         X = np.asarray(validate_data(self, X, reset=False, dtype=np.float64))
@@ -303,10 +302,10 @@ class TransferRegressor(
         self,
         X: ArrayLike,
         y: ArrayLike,
-        X_unlabelled: ArrayLike | None,
+        X_unlabeled: ArrayLike | None,
         source: SourceModel,
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Checked X (N, n), y (N, F) and X_unlabelled (M, n)."""
+    ) -> tuple[Array, Array, Array]:
+        """Checked X (N, n), y (N, F) and X_unlabeled (M, n)."""
         checked, targets = validate_data(
             self,
             X,
@@ -331,19 +330,19 @@ class TransferRegressor(
                 "X is constant: all samples have the same input "
                 f"{checked[0].tolist()}, which no map can tell apart"
             )
-        unlabelled = np.empty((0, checked.shape[1]))
-        if X_unlabelled is not None:
-            unlabelled = np.asarray(
+        unlabeled = np.empty((0, checked.shape[1]))
+        if X_unlabeled is not None:
+            unlabeled = np.asarray(
                 check_array(
-                    X_unlabelled, dtype=np.float64, input_name="X_unlabelled"
+                    X_unlabeled, dtype=np.float64, input_name="X_unlabeled"
                 )
             )
-            if unlabelled.shape[1] != checked.shape[1]:
+            if unlabeled.shape[1] != checked.shape[1]:
                 raise ValueError(
-                    f"X_unlabelled has {unlabelled.shape[1]} features, but X "
+                    f"X_unlabeled has {unlabeled.shape[1]} features, but X "
                     f"has {checked.shape[1]}"
                 )
-        return checked, targets, unlabelled
+        return checked, targets, unlabeled
 
     def _warn_of_freedom(
         self, mapping: Mapping, source: SourceModel, n: int, n_in: int
@@ -385,8 +384,8 @@ class TransferRegressor(
         return domain
 
     def _whiten(
-        self, source: SourceModel, y: FloatArray, domain: Domain | None
-    ) -> tuple[SourceModel, FloatArray, float, float]:
+        self, source: SourceModel, y: Array, domain: Domain | None
+    ) -> tuple[SourceModel, Array, float, float]:
         """The problem in outputs whose errors are alike, and as few as serve.
 
         Returns:
@@ -420,7 +419,7 @@ class TransferRegressor(
         domain: Domain | None,
         n_in: int,
         n_out: int,
-        unlabelled: FloatArray,
+        unlabeled: Array,
     ) -> frozenset[str]:
         """Which terms the prior has: "inside", "shape", "moments"."""
         prior = self.prior
@@ -433,7 +432,7 @@ class TransferRegressor(
                 "domain, the lowest and highest value of each of its inputs"
             )
         terms = {"inside"}
-        if prior == "moments" or (prior == "auto" and len(unlabelled)):
+        if prior == "moments" or (prior == "auto" and len(unlabeled)):
             terms.add("moments")
         # A map to fewer inputs must lose some: it cannot be a similarity.
         bends = isinstance(mapping, Affine) and 2 <= n_in <= n_out
@@ -443,7 +442,7 @@ class TransferRegressor(
 
     def _report(
         self,
-        named: list[tuple[str, FloatArray]],
+        named: list[tuple[str, Array]],
         minima: Minima,
         repeated: NDArray[np.bool_],
         rest: float,
@@ -494,7 +493,7 @@ class TransferRegressor(
                 stacklevel=3,
             )
 
-    def _fit_residual(self, X: FloatArray, y: FloatArray) -> None:
+    def _fit_residual(self, X: Array, y: Array) -> None:
         self.residual_ = None
         if self.residual is None:
             return
@@ -535,7 +534,7 @@ def loo_covariance(
     X: ArrayLike,
     y: ArrayLike,
     shrinkage: float = 0.5,
-) -> FloatArray:
+) -> Array:
     """Covariance of the errors an ELM makes on samples it has not seen.
 
     Some outputs of a skill depend on the task, others hardly do and only vary
@@ -565,8 +564,8 @@ def loo_covariance(
 
 
 def _shrunk(
-    covariance: FloatArray, shrinkage: float, floor: float | FloatArray = 0.0
-) -> FloatArray:
+    covariance: Array, shrinkage: float, floor: float | Array = 0.0
+) -> Array:
     """On the way to its diagonal, with a floor (F,) of the variances."""
     variances = np.diag(covariance)
     # No output is known better than a thousandth of the worst.
@@ -578,13 +577,13 @@ def _shrunk(
 
 def _expected_errors(
     estimator: Any, source: SourceModel, domain: Domain | None
-) -> FloatArray | None:
+) -> Array | None:
     """Covariance (F, F) of the errors of an ELM's predictions; else None.
 
     That of a new sample, averaged over the tasks of the domain: the noise of
     the outputs, and what the samples have left open of the function.
     """
-    elm = unfrozen(estimator)
+    elm = unwrap_frozen(estimator)
     if not isinstance(elm, ElmRegressor) or source.n_out == 1:
         return None
     try:
@@ -619,7 +618,7 @@ def _make_prior(
     )
 
 
-def _whitening(metric: ArrayLike, n_out: int) -> FloatArray:
+def _whitening(metric: ArrayLike, n_out: int) -> Array:
     """L (F, F) such that errors e with that covariance have e L white."""
     covariance = np.asarray(metric, dtype=float)
     if covariance.shape == (n_out,):
@@ -638,7 +637,7 @@ def _whitening(metric: ArrayLike, n_out: int) -> FloatArray:
     return np.linalg.inv(root).T
 
 
-def _spread(source: SourceModel, y: FloatArray, domain: Domain | None) -> float:
+def _spread(source: SourceModel, y: Array, domain: Domain | None) -> float:
     """The variance of an output over the tasks; the mean over the outputs."""
     values = y
     if domain is not None:
@@ -652,7 +651,7 @@ def _spread(source: SourceModel, y: FloatArray, domain: Domain | None) -> float:
 
 
 @functools.cache
-def _even_tasks(n_in: int) -> FloatArray:
+def _even_tasks(n_in: int) -> Array:
     """64 points that fill [0, 1]^n_in evenly."""
     return qmc.Halton(n_in, seed=0).random(64)
 
@@ -664,7 +663,7 @@ def _same_or_unit(target: Domain, n_out: int) -> Domain:
 
 
 def _repetitions(
-    moved: FloatArray, cost: FloatArray, domain: Domain
+    moved: Array, cost: Array, domain: Domain
 ) -> NDArray[np.bool_]:
     """Which minima (S,) map the samples as a better one already does."""
     z = moved / domain.deviation

@@ -8,11 +8,10 @@ import dataclasses
 
 import numba
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from drake_affetto.common.errors import require
-
-FloatArray = NDArray[np.float64]
+from drake_affetto.common.typing import Array
 
 
 @dataclasses.dataclass
@@ -33,7 +32,7 @@ class Hand:
 
 def contact_force(
     t: ArrayLike, target: ArrayLike, hand: Hand | list[Hand] | None = None
-) -> FloatArray:
+) -> Array:
     """Force of hands that are led along `target` onto a surface at height 0.
 
     Semi-implicit steps of the hand's height z under the arm's spring-damper
@@ -105,7 +104,7 @@ def stroke(
     fall: float,
     dwell: float,
     rise: float,
-) -> FloatArray:
+) -> Array:
     """Height of a stroke: down by a raised cosine, dwell, and up again.
 
     Args:

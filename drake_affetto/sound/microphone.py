@@ -48,7 +48,7 @@ class DrumMicrophone(LeafSystem):
     Output ports:
 
     - `contact_force` (2): force on the head along its inward normal [N],
-      never negative, and distance of that force's centre from the centre of
+      never negative, and distance of that force's center from the center of
       the head [m]. Both zero without contact.
     - `knock_force` (2): sum of the magnitudes of the contact forces on the
       shell [N] and on the table [N].
@@ -72,7 +72,7 @@ class DrumMicrophone(LeafSystem):
             shell: bodies that count as the drum's shell or rim.
             table: bodies that count as the table.
             X_BH: pose of the head's frame H in the body `head`; Ho is the
-                centre of the membrane and Hz points out of the drum.
+                center of the membrane and Hz points out of the drum.
 
         Raises:
             InputError: if one body is given two parts.
@@ -171,7 +171,7 @@ class DrumMicrophone(LeafSystem):
         return self._body_poses_port
 
     def get_contact_force_output_port(self) -> OutputPort:
-        """Normal force on the head [N] and its distance from the centre [m]."""
+        """Normal force on the head [N] and its distance from the center [m]."""
         return self._contact_force_port
 
     def get_knock_force_output_port(self) -> OutputPort:

@@ -12,14 +12,13 @@ from collections.abc import Sequence
 import dataclasses
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import fft, ndimage, signal
 
 from drake_affetto.common.errors import require, require_range
+from drake_affetto.common.typing import Array
 from drake_affetto.sound import impact
 from drake_affetto.sound.voice import DrumVoice
-
-FloatArray = NDArray[np.float64]
 
 SUCCESS_THRESHOLD = 0.15
 """A trial succeeded if its reward is above this (the paper's value)."""
@@ -67,7 +66,7 @@ class RewardConfig:
         require_range(f"{where}.lead", self.lead, 0.0, self.length)
 
 
-def _filterbank(config: RewardConfig, rate: float, size: int) -> FloatArray:
+def _filterbank(config: RewardConfig, rate: float, size: int) -> Array:
     """Weights (bands, size // 2 + 1): triangles on a log frequency axis."""
     frequency = np.fft.rfftfreq(size, 1.0 / rate)
     edges = np.geomspace(config.low, config.high, config.bands + 2)
@@ -76,8 +75,8 @@ def _filterbank(config: RewardConfig, rate: float, size: int) -> FloatArray:
         np.log(edges),
         np.arange(config.bands + 2, dtype=float),
     )
-    centre = np.arange(1, config.bands + 1)[:, None]
-    return np.maximum(1.0 - np.abs(position[None, :] - centre), 0.0)
+    center = np.arange(1, config.bands + 1)[:, None]
+    return np.maximum(1.0 - np.abs(position[None, :] - center), 0.0)
 
 
 def _padded_size(config: RewardConfig, rate: float, size: int) -> int:
@@ -89,11 +88,11 @@ def _padded_size(config: RewardConfig, rate: float, size: int) -> int:
 
 def spectrogram(
     pressure: ArrayLike, rate: float, config: RewardConfig | None = None
-) -> FloatArray:
+) -> Array:
     """What stands out of a recording: compressed band levels.
 
     From L = log10(1 + P / floor^2), P the mean square sound pressure of a
-    frame in a band [Pa^2], the mean of L over the neighbouring bands is taken
+    frame in a band [Pa^2], the mean of L over the neighboring bands is taken
     off (`contrast`); what is left below zero counts as zero.
 
     Args:
@@ -189,7 +188,7 @@ def reward(recording: ArrayLike, prototypes: Sequence[ArrayLike]) -> float:
     """
     trial = _spectrogram_array("recording", recording)
     require(len(prototypes) > 0, "prototypes", "none", "at least one")
-    groups: dict[int, list[FloatArray]] = {}
+    groups: dict[int, list[Array]] = {}
     for i, prototype in enumerate(prototypes):
         array = _spectrogram_array(f"prototypes[{i}]", prototype)
         require(
@@ -210,7 +209,7 @@ def reward(recording: ArrayLike, prototypes: Sequence[ArrayLike]) -> float:
 
 def reward_over_time(
     recording: ArrayLike, prototypes: Sequence[ArrayLike]
-) -> FloatArray:
+) -> Array:
     """What Eq. 10 would be with the prototypes held at one place of Eq. 9.
 
     Args:
@@ -245,7 +244,7 @@ def reward_over_time(
     return np.max(1.0 - np.sqrt(np.maximum(square, 0.0)) / norms, axis=1)
 
 
-def _distances(recording: FloatArray, stack: FloatArray) -> FloatArray:
+def _distances(recording: Array, stack: Array) -> Array:
     """Least distances (N) of prototypes (N, bands, t_p) in a recording."""
     rows, columns = _places(recording, stack)
     # |a - b|^2 by correlation finds the place; there the difference itself is
@@ -255,9 +254,7 @@ def _distances(recording: FloatArray, stack: FloatArray) -> FloatArray:
     return np.linalg.norm(rows[best] - columns, axis=1)
 
 
-def _places(
-    recording: FloatArray, stack: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _places(recording: Array, stack: Array) -> tuple[Array, Array]:
     """Each place of the recording (places, m), each prototype (N, m)."""
     count, bands, frames = stack.shape
     require(
@@ -281,7 +278,7 @@ def _places(
 
 def cut_prototype(
     recording: ArrayLike, config: RewardConfig | None = None
-) -> FloatArray:
+) -> Array:
     """The part of a recording around its loudest moment.
 
     Args:
@@ -308,13 +305,11 @@ def cut_prototype(
     return sound[:, start : start + frames].copy()
 
 
-def tap_recordings(
-    voice: DrumVoice, rng: np.random.Generator
-) -> list[FloatArray]:
+def tap_recordings(voice: DrumVoice, rng: np.random.Generator) -> list[Array]:
     """What the microphone records when the experimenter taps the drum.
 
     A few firm taps with a hand as soft as the robot's, short and long, at the
-    centre, half-way to the rim and near it, one recording each [Pa].
+    center, half-way to the rim and near it, one recording each [Pa].
     """
     t = np.arange(0.0, 1.5, 1e-3)
     a = voice.config.membrane.radius
@@ -329,7 +324,7 @@ def tap_recordings(
                 t, impact.stroke(t, 0.2, 0.06, depth, fall, dwell, fall)
             )
             recordings.append(
-                voice.synthesise(t, force, np.full_like(t, place * a), rng=rng)
+                voice.synthesize(t, force, np.full_like(t, place * a), rng=rng)
             )
     return recordings
 
@@ -338,7 +333,7 @@ def tap_prototypes(
     voice: DrumVoice,
     config: RewardConfig | None = None,
     rng: np.random.Generator | None = None,
-) -> list[FloatArray]:
+) -> list[Array]:
     """Prototypes (bands, t_p) from the experimenter's own taps.
 
     They judge the first demonstrations, when the robot has not drummed yet.
@@ -351,7 +346,7 @@ def tap_prototypes(
     ]
 
 
-def _spectrogram_array(field: str, values: ArrayLike) -> FloatArray:
+def _spectrogram_array(field: str, values: ArrayLike) -> Array:
     array = np.asarray(values, dtype=float)
     require(
         array.ndim == 2 and array.size > 0,

@@ -10,15 +10,14 @@ from collections.abc import Iterator
 import dataclasses
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 
 from drake_affetto.common.errors import require
+from drake_affetto.common.typing import Array
 from drake_affetto.sound import impact
 from drake_affetto.sound.reward import SUCCESS_THRESHOLD
 from drake_affetto.sound.voice import DrumVoice
-
-FloatArray = NDArray[np.float64]
 
 HITS = ("head", "head and rim")
 OTHERS = (
@@ -42,7 +41,7 @@ class Trial:
     """Impulse on the head [N s]."""
     rate_of_force: float
     """Fastest change of the force on the head [N/s]."""
-    pressure: FloatArray
+    pressure: Array
     """The recording [Pa]."""
 
 
@@ -58,8 +57,8 @@ def random_hand(rng: np.random.Generator, hard: bool = False) -> impact.Hand:
 
 
 def random_mass_flow(
-    t: FloatArray, rng: np.random.Generator, valves: int = 16
-) -> FloatArray:
+    t: Array, rng: np.random.Generator, valves: int = 16
+) -> Array:
     """Flow through the valves (T, valves) [kg/s]: leakage and movements."""
     knots = np.arange(t[0], t[-1] + 0.25, 0.15)
     opening = np.maximum(rng.normal(0.0, 1.0, (len(knots), valves)), 0.0)
@@ -96,7 +95,7 @@ def made_up_trial(
         rng.uniform(0.3, 0.8),
     )
     if kind == "slow press":
-        # Led down from just above the head, at millimetres a second.
+        # Led down from just above the head, at millimeters a second.
         path = np.interp(
             t, [0.0, 0.3 * duration, duration], [1e-3, 1e-3, -depth]
         )
@@ -112,7 +111,7 @@ def made_up_trial(
         place = rng.uniform(0.8, 0.98)
     else:
         place = 0.9 * np.sqrt(rng.uniform())
-    pressure = voice.synthesise(
+    pressure = voice.synthesize(
         t,
         head,
         np.full_like(t, place * voice.config.membrane.radius),

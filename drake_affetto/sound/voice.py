@@ -32,11 +32,10 @@ from scipy import linalg, signal, special
 from scipy.io import wavfile
 
 from drake_affetto.common.errors import InputError, require, require_range
+from drake_affetto.common.typing import Array
 
 _AIR_DENSITY = 1.2  # kg/m^3
 _SOUND_SPEED = 343.0  # m/s
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclasses.dataclass
@@ -157,9 +156,9 @@ class VoiceConfig:
     hiss: HissConfig = dataclasses.field(default_factory=HissConfig)
     rim_coupling: float = 0.05
     """Part of a force at the edge of the head that shakes the shell; it falls
-    with the square of the radius towards the centre."""
+    with the square of the radius towards the center."""
     microphone_distance: float = 0.3
-    """Distance from the head's centre to the microphone [m]."""
+    """Distance from the head's center to the microphone [m]."""
     microphone_angle: float = 1.0
     """Angle between the drum's axis and the microphone's direction [rad]."""
     microphone_noise: float = 1e-3
@@ -192,13 +191,13 @@ class VoiceConfig:
 class Modes:
     """Damped oscillators and what they sound like, N of them."""
 
-    omega: FloatArray
+    omega: Array
     """Undamped angular frequency (N) [rad/s]."""
-    alpha: FloatArray
+    alpha: Array
     """Decay rate (N) [1/s]: free motion falls as exp(-alpha t)."""
-    mass: FloatArray
+    mass: Array
     """Modal mass (N) [kg]."""
-    gain: FloatArray
+    gain: Array
     """Pressure at the microphone by modal acceleration (N) [Pa s^2/m]."""
 
 
@@ -210,9 +209,9 @@ class MembraneModes(Modes):
     """Number of nodal diameters m (N)."""
     circle: NDArray[np.int64]
     """Number of nodal circles n, the rim among them (N)."""
-    zero: FloatArray
+    zero: Array
     """j_mn (N)."""
-    mean: FloatArray
+    mean: Array
     """Mean of the mode shape over the head (N): the response to a force
     spread over all of it, 0 for m > 0."""
 
@@ -289,7 +288,7 @@ def body_modes(body: BodyConfig, config: VoiceConfig) -> Modes:
     )
 
 
-def _transition(modes: Modes, step: float) -> FloatArray:
+def _transition(modes: Modes, step: float) -> Array:
     """Exact steps (N, 2, 4) of the oscillators for linearly changing force.
 
     Columns: q, q', force at the start, force at the end of the step.
@@ -531,7 +530,7 @@ class DrumVoice:
         """Sampling rate of the sound [Hz]."""
         return self.config.rate
 
-    def mode_shapes(self, radius: ArrayLike) -> FloatArray:
+    def mode_shapes(self, radius: ArrayLike) -> Array:
         """Membrane mode shapes J_m(j_mn r/a), (T, N), at radii (T) [m]."""
         scaled = np.clip(
             np.asarray(radius, dtype=float) / self.config.membrane.radius,
@@ -547,7 +546,7 @@ class DrumVoice:
             below + 1
         ]
 
-    def synthesise(
+    def synthesize(
         self,
         t: ArrayLike,
         head_force: ArrayLike,
@@ -556,13 +555,13 @@ class DrumVoice:
         table_force: ArrayLike | None = None,
         mass_flow: ArrayLike | None = None,
         rng: np.random.Generator | None = None,
-    ) -> FloatArray:
+    ) -> Array:
         """The sound pressure at the microphone.
 
         Args:
             t: times of the samples (T), evenly spaced [s].
             head_force: normal force on the head (T) [N].
-            head_radius: where it acts, distance from the centre (T) [m];
+            head_radius: where it acts, distance from the center (T) [m];
                 read only where there is force.
             shell_force: force on the shell (T) [N].
             table_force: force on the table (T) [N].
@@ -648,7 +647,7 @@ class DrumVoice:
             pressure,
         )
 
-    def _hiss(self, mass_flow, rows, period, samples, rng) -> FloatArray:
+    def _hiss(self, mass_flow, rows, period, samples, rng) -> Array:
         flow = np.asarray(mass_flow, dtype=float)
         require(
             flow.ndim in (1, 2) and len(flow) == rows,
@@ -675,7 +674,7 @@ class DrumVoice:
 
 def _vector(
     field: str, values: ArrayLike | None, rows: int | None = None
-) -> FloatArray:
+) -> Array:
     if values is None:
         return np.zeros(rows or 0)
     array = np.ascontiguousarray(values, dtype=float)
@@ -692,12 +691,12 @@ def _vector(
 
 
 def _held_radius(
-    force: FloatArray, radius: FloatArray
-) -> tuple[NDArray[np.int64], FloatArray]:
+    force: Array, radius: Array
+) -> tuple[NDArray[np.int64], Array]:
     """Samples in or beside a contact, and the contact's radius there.
 
     Just before and after a contact there is no place yet; the contact's own
-    is meant, so that the modal force does not start from the centre.
+    is meant, so that the modal force does not start from the center.
     """
     contact = force > 0.0
     place = np.where(contact, radius, np.nan)

@@ -2,7 +2,7 @@
 
 Drake describes a Diagram in Graphviz's language; here the description is made
 readable (no ports that nothing is connected to, the Diagram's own ports named
-where they are, a colour for each stage) and rendered by the Graphviz library
+where they are, a color for each stage) and rendered by the Graphviz library
 that pygraphviz brings along, so that no `dot` program is needed.
 """
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 SOURCE_SUFFIXES = (".dot", ".gv")
 IMAGE_SUFFIXES = (".svg", ".png", ".pdf")
 
-# The stages of the signal's way round, in pale colours that print.
+# The stages of the signal's way round, in pale colors that print.
 STAGE_COLORS = {
     "scene": "#e6e6e6",
     "perception": "#cfe3f7",
@@ -188,7 +188,7 @@ def check_suffix(path: str | Path) -> Path:
 
 
 def _stage_colors(system: System) -> dict[str, str]:
-    """The colour of each subsystem that belongs to a stage, by its name."""
+    """The color of each subsystem that belongs to a stage, by its name."""
     colors = {}
     for subsystem in getattr(system, "GetSystems", list)():
         package, _, rest = type(subsystem).__module__.partition(".")

@@ -35,8 +35,8 @@ class DrumRegion:
     """Where trials put the drum: a box on the table, in the world frame.
 
     Attributes:
-        x: lower and upper limit of the drum's centre, m.
-        y: lower and upper limit of the drum's centre, m.
+        x: lower and upper limit of the drum's center, m.
+        y: lower and upper limit of the drum's center, m.
     """
 
     x: list[float] = dataclasses.field(default_factory=lambda: [0.2, 0.27])
@@ -59,7 +59,7 @@ class LookConfig:
     """How the robot looks for the drum.
 
     Attributes:
-        mode: "centre": the upper body turns until the marker is centred,
+        mode: "centre": the upper body turns until the marker is centered,
             τ = [y_img, q3*]. "fixed_yaw": it turns to a given yaw,
             τ̂ = [x_img, y_img].
         fixed_yaw: that yaw, rad.
@@ -81,7 +81,7 @@ class LookConfig:
 
 @dataclasses.dataclass
 class SkillConfig:
-    """The parameterised skill (paper Eqs. 3 and 4).
+    """The parameterized skill (paper Eqs. 3 and 4).
 
     Attributes:
         n_hidden: H, hidden neurons of the ELM.

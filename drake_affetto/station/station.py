@@ -45,7 +45,7 @@ from drake_affetto.station.scenario import Scenario
 from drake_affetto.teaching.kinesthetic_teacher import KinestheticTeacher
 from drake_affetto.teaching.mouse_teacher import MouseTeacher
 
-_MODES = {"centre": GazeMode.CENTRE, "fixed_yaw": GazeMode.FIXED_YAW}
+_MODES = {"centre": GazeMode.CENTER, "fixed_yaw": GazeMode.FIXED_YAW}
 
 
 class AffettoStation(Diagram):
@@ -101,7 +101,7 @@ class AffettoStation(Diagram):
     - camera.color_image (ImageRgba8U), camera.label_image (ImageLabel16I):
       calculated when evaluated.
     - camera.blob (3), camera.blob_pixels (4): see `BlobSensor`.
-    - drum.contact_force (2): N on the head, m from its centre.
+    - drum.contact_force (2): N on the head, m from its center.
     - drum.knock_force (2): N on the shell, N on the table.
     - teacher.pulling_force (3): N, in the world.
 
@@ -260,7 +260,7 @@ class AffettoStation(Diagram):
         )
 
     def marker_position(self, context: Context) -> np.ndarray:
-        """p_WMarker, the centre of the drum's marker, (3,) m."""
+        """p_WMarker, the center of the drum's marker, (3,) m."""
         return world.marker_position(self.plant, self._sub(self.plant, context))
 
     def head_center_position(self, context: Context) -> np.ndarray:

@@ -67,7 +67,7 @@ def test_calibrate_prints_yaml(capsys, tmp_path):
 
 def test_a_drum_that_cannot_be_looked_at_is_refused(capsys, tmp_path):
     for place, words in (
-        (["0.2", "0.35"], "cannot be centred"),
+        (["0.2", "0.35"], "cannot be centered"),
         (["2.0", "0.0"], "drum position"),
     ):
         options = ["--drum", *place, "--out", str(tmp_path)]

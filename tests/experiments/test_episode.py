@@ -29,7 +29,7 @@ def lesson(runner):
     return runner.teach(XY, seed=1)
 
 
-def test_looking_centres_the_marker(runner):
+def test_looking_centers_the_marker(runner):
     look = runner.gaze(XY, seed=0)
     assert look.found
     assert look.duration < 2.5

@@ -79,7 +79,7 @@ def test_a_moved_robot_changes_nothing_as_its_camera_moves_along(reference):
 def test_places_are_those_of_the_drum(reference):
     xy = reference.sight.positions[::7]
     tau = reference.task_parameters(xy)
-    # The centroid is not quite the centre: a millimetre.
+    # The centroid is not quite the center: a millimeter.
     np.testing.assert_allclose(places_of(reference, tau), xy, atol=3e-3)
 
 

@@ -91,7 +91,7 @@ def test_direction_is_the_inverse_of_projection(camera):
     np.testing.assert_allclose(camera.project(depth * direction), uv, atol=1e-7)
 
 
-def test_pixel_coordinates_are_integers_at_pixel_centres():
+def test_pixel_coordinates_are_integers_at_pixel_centers():
     camera = PinholeCamera.from_fov(320, 240, 0.9)
     np.testing.assert_allclose(camera.project([0, 0, 1]), [159.5, 119.5])
     np.testing.assert_allclose(camera.image_center, [159.5, 119.5])
@@ -174,7 +174,7 @@ def test_mirror_view_holds_every_pixel_that_sees_the_mirror(seed):
     ] = False
     assert not outside.any()
     # The rectangle is hardly larger than needed; pointed corners hold no
-    # pixel's centre.
+    # pixel's center.
     if sees.sum() > 2000:
         columns = np.flatnonzero(sees.any(axis=0))
         assert view.left >= columns[0] - 8
@@ -276,3 +276,34 @@ def test_turning_the_camera_moves_the_image_by_the_sensitivity():
     assert rate == pytest.approx(difference, rel=1e-4)
     # Turning left moves the image to the right.
     assert rate > 0
+
+
+def test_the_image_ends_at_its_edge():
+    camera = PinholeCamera.from_fov(320, 240, 0.8)
+    uv = np.array([[-0.5, 0.0], [319.5, 239.5], [319.6, 0.0], [np.nan, 0.0]])
+    assert camera.inside(uv).tolist() == [True, True, False, False]
+    assert camera.inside(uv, margin=1).tolist() == [False] * 4
+
+
+def test_points_are_taken_into_the_frame_of_each_row():
+    X = np.stack([np.eye(4), np.eye(4)])
+    X[1, 0, 3] = 0.1
+    points = np.full((2, 3, 3), [0.0, 0.0, 1.0])
+    found = optics.points_in_frame(X, points)
+    assert found[0, :, 0] == pytest.approx(0.0)
+    assert found[1, :, 0] == pytest.approx(-0.1)
+    one = optics.points_in_frame(X[1], points[1])
+    assert one == pytest.approx(
+        optics.transform_points(optics.invert_pose(X[1]), points[1])
+    )
+
+
+def test_areas_of_polygons_agree_with_the_moments():
+    rng = np.random.default_rng(0)
+    angles = np.sort(rng.uniform(0, 2 * np.pi, (5, 9)), axis=1)
+    polygons = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    for polygon, area in zip(
+        polygons, optics.polygon_area(polygons), strict=True
+    ):
+        expected, _ = optics.polygon_area_centroid(polygon)
+        assert area == pytest.approx(expected)

@@ -175,7 +175,7 @@ def test_the_arm_returns_to_where_it_started():
 def test_encode_finds_the_movement_again(method):
     dmp = Dmp(DmpConfig(method=method, smoothing=0.005))
     random = np.random.default_rng(3)
-    # Neighbouring weights alike, as those of a hand's movement are.
+    # Neighboring weights alike, as those of a hand's movement are.
     theta = np.interp(
         np.arange(15), np.arange(0, 15, 4), 20 * random.normal(size=4)
     )

@@ -8,7 +8,7 @@ from drake_affetto.common.errors import InputError
 from drake_affetto.geometry import optics
 from drake_affetto.geometry.optics import PinholeCamera
 from drake_affetto.perception.analytic import (
-    Hiders,
+    Occluders,
     measured_blob,
     visible_marker,
 )
@@ -41,7 +41,7 @@ def test_a_whole_disc_is_its_projection():
 
 
 def test_half_a_disc_at_the_images_border():
-    # Its centre is on the image's left edge.
+    # Its center is on the image's left edge.
     x = -160.0 / CAMERA.focal_x * 0.5
     area, uv = visible_marker(CAMERA, EYE, facing(x), 0.03)
     radius = 0.03 / 0.5 * CAMERA.focal_x
@@ -73,7 +73,7 @@ def test_half_a_disc_at_the_mirrors_edge():
 
 
 def sphere(center, radius, on_camera=False):
-    return Hiders(
+    return Occluders(
         optics.make_pose(np.eye(3), center)[None],
         np.full((1, 3), radius),
         np.array([on_camera]),
@@ -89,13 +89,13 @@ def test_what_stands_in_the_way_takes_its_part():
     assert seen[0] < uv[0] - 2.0
     assert seen[1] == pytest.approx(uv[1], abs=0.5)
     # All of it; nothing, as it is beside; nothing, as it carries the camera.
-    for hiders, part in (
+    for occluders, part in (
         (sphere([0, 0, 0.25], 0.1), 0.0),
         (sphere([0.3, 0, 0.25], 0.1), 1.0),
         (sphere([0, 0, 0.7], 0.1), 1.0),
         (sphere([0, 0, 0.25], 0.1, on_camera=True), 1.0),
     ):
-        area, _ = visible_marker(CAMERA, EYE, facing(), 0.03, None, hiders)
+        area, _ = visible_marker(CAMERA, EYE, facing(), 0.03, None, occluders)
         assert area == pytest.approx(part * whole)
 
 

@@ -66,7 +66,7 @@ def test_alpha_channel_is_ignored():
 def test_no_marker_is_not_found():
     config = BlobConfig()
     rng = np.random.default_rng(0)
-    # Images of any other colours: the marker's hue left out by construction.
+    # Images of any other colors: the marker's hue left out by construction.
     for _ in range(40):
         colors = rng.integers(0, 256, (6, 8, 3), dtype=np.uint8)
         _, chroma, hue = np.vectorize(
@@ -95,7 +95,7 @@ def test_shapes_that_are_no_disc_are_refused():
     assert detect(speck, BlobConfig()) is None
 
 
-def test_distractors_of_other_colours_and_shapes_do_not_matter():
+def test_distractors_of_other_colors_and_shapes_do_not_matter():
     image = draw_disc(100.0, 80.0, 9, color=(200, 40, 30))
     image = draw_disc(220.0, 80.0, 20, color=(40, 60, 200), image=image)
     image = draw_disc(60.0, 180.0, 12, color=(230, 210, 40), image=image)
@@ -159,7 +159,7 @@ def test_coarse_gate_loses_nothing():
 
 def test_calibration_and_its_inverse():
     box = BlobCalibration(20.0, 220.0, 40.0, 140.0)
-    xy = box.normalise([[20, 40], [220, 140], [120, 90]])
+    xy = box.normalize([[20, 40], [220, 140], [120, 90]])
     np.testing.assert_allclose(xy, [[0, 0], [1, 1], [0.5, 0.5]])
     np.testing.assert_allclose(
         box.pixels(xy), [[20, 40], [220, 140], [120, 90]]

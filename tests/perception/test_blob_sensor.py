@@ -31,7 +31,7 @@ def sensor():
     return BlobSensor(BlobConfig(calibration=BOX))
 
 
-def test_blob_is_normalised_over_the_calibrated_box(sensor):
+def test_blob_is_normalized_over_the_calibrated_box(sensor):
     context = sensor.CreateDefaultContext()
     port = sensor.get_color_image_input_port()
     port.FixValue(context, picture(70, 35))

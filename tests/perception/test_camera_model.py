@@ -9,7 +9,7 @@ from drake_affetto.common.errors import InputError
 from drake_affetto.geometry import optics
 from drake_affetto.geometry.kinematics import SerialChain
 from drake_affetto.perception.blob import BlobCalibration
-from drake_affetto.perception.camera_model import Mirror, SightModel
+from drake_affetto.perception.camera_model import CameraModel, Mirror
 from drake_affetto.perception.config import rotation_matrix
 from drake_affetto.perception.plant_camera_model import calibrate_view
 from support.trunk_camera import FISHEYE, HEIGHT, MIRROR, PINHOLE, make
@@ -34,7 +34,7 @@ def test_a_chain_is_taken_apart_at_the_yaw_joint():
     angles = {"a": 0.2, "b": -0.4, "c": 0.3, "d": 0.9}
     X_FC = optics.make_pose(rotation_matrix([0, 0, 0.5]), [0, 0.02, 0])
     for yaw_joint in names:
-        sight = SightModel.from_chain(
+        sight = CameraModel.from_chain(
             PINHOLE, chain, yaw_joint, angles, HEIGHT, 0.03, X_FC
         )
         for yaw in (-0.5, 0.0, 0.7):
@@ -53,10 +53,10 @@ def test_a_chain_is_taken_apart_at_the_yaw_joint():
     st.floats(-0.4, 0.4),
     st.floats(-0.15, 0.15),
 )
-def test_the_centring_yaw_centres(camera, x, y, pan, tilt):
+def test_the_centering_yaw_centers(camera, x, y, pan, tilt):
     sight = make(camera, pan=pan, tilt=tilt)
     p_W = sight.marker(np.array([x, y]))
-    yaw = float(sight.centring_yaw(p_W))
+    yaw = float(sight.centering_yaw(p_W))
     assert np.isfinite(yaw)
     p_C = optics.transform_points(
         optics.invert_pose(sight.camera_pose(yaw)), p_W
@@ -65,14 +65,14 @@ def test_the_centring_yaw_centres(camera, x, y, pan, tilt):
     assert u == pytest.approx(camera.image_center[0], abs=1e-6)
 
 
-def test_a_rolled_camera_is_centred_too_by_its_centroid():
+def test_a_rolled_camera_is_centered_too_by_its_centroid():
     sight = make(roll=0.3)
     yaws, pixels = sight.direct_pixels([[0.28, -0.1], [0.3, 0.12]])
     np.testing.assert_allclose(pixels[:, 0], 159.5, atol=1e-4)
-    # What is centred is the centroid: the centre is a little off.
+    # What is centered is the centroid: the center is a little off.
     for xy, yaw in zip([[0.28, -0.1], [0.3, 0.12]], yaws, strict=True):
-        centre = sight.image_of(np.array([xy]), yaw)[0]
-        assert 0 < abs(centre[0] - 159.5) < 2
+        center = sight.image_of(np.array([xy]), yaw)[0]
+        assert 0 < abs(center[0] - 159.5) < 2
 
 
 def test_direct_task_parameters_are_image_height_and_yaw():
@@ -155,7 +155,7 @@ def test_calibration_holds_what_is_seen():
     pixels = sight.fixed_yaw_pixels(grid, 0.0)
     seen = np.isfinite(pixels[:, 0])
     assert seen.sum() >= 3
-    image = fixed.normalise(pixels[seen])
+    image = fixed.normalize(pixels[seen])
     assert image.min() > 0
     assert image.max() < 1
     with pytest.raises(InputError, match="seen at 0 of 16"):

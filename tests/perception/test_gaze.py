@@ -70,7 +70,7 @@ def simulate(
     visible=lambda t, x: abs(x - 0.5) < 0.5,
     breakaway=0.25,
 ):
-    """A marker that is centred at the yaw `marker`; 1 ms steps."""
+    """A marker that is centered at the yaw `marker`; 1 ms steps."""
     rng = np.random.default_rng(seed)
     servo = Gaze(config or GazeConfig(), VIEW)
     task = task or GazeTask()
@@ -110,7 +110,7 @@ def simulate(
 
 
 @pytest.mark.parametrize("marker", [-0.35, -0.12, 0.02, 0.2, 0.38])
-def test_the_marker_is_centred_and_its_yaw_told(marker):
+def test_the_marker_is_centered_and_its_yaw_told(marker):
     runs = [simulate(marker, seed=s, duration=4.0) for s in range(3)]
     for run in runs:
         assert run.phase == GazePhase.SETTLED
@@ -226,7 +226,7 @@ def test_disabled_it_does_nothing():
 def test_ready_waits_for_the_command_to_be_back():
     servo, task = Gaze(GazeConfig(settled_frames=2), VIEW), GazeTask()
     x = servo.initial_state()
-    # The marker is centred at 0.4 and the joint is there at once.
+    # The marker is centered at 0.4 and the joint is there at once.
     for k in range(20):
         t = 0.1 * k
         q = servo.yaw_command(x, t, task)

@@ -25,7 +25,7 @@ MARKER = 0.25
 
 
 class Eye(LeafSystem):
-    """A marker centred at the yaw `MARKER`; counts who looks."""
+    """A marker centered at the yaw `MARKER`; counts who looks."""
 
     def __init__(self):
         super().__init__()

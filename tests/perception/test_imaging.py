@@ -12,7 +12,7 @@ from drake_affetto.perception.imaging import (
     motion_blur_kernel,
 )
 
-GREY = np.full((60, 80, 3), 120, dtype=np.uint8)
+GRAY = np.full((60, 80, 3), 120, dtype=np.uint8)
 
 
 def test_no_effects_leave_the_image_alone():
@@ -36,28 +36,28 @@ def test_one_stop_doubles_the_light():
     assert tables[255, 0] == 255
 
 
-def test_white_balance_acts_on_each_colour():
-    out = apply_effects(GREY, ImageEffects(white_balance=[1.3, 1.0, 0.7]))
+def test_white_balance_acts_on_each_color():
+    out = apply_effects(GRAY, ImageEffects(white_balance=[1.3, 1.0, 0.7]))
     red, green, blue = out[0, 0].astype(int)
     assert red > green == 120 > blue
 
 
 def test_noise_has_its_deviation_and_repeats_with_seed_and_time():
     bank = NoiseBank()
-    first = bank.add(GREY, 5.0, seed=1, time=0.2)
-    np.testing.assert_array_equal(first, bank.add(GREY, 5.0, 1, 0.2))
-    np.testing.assert_array_equal(first, NoiseBank().add(GREY, 5.0, 1, 0.2))
+    first = bank.add(GRAY, 5.0, seed=1, time=0.2)
+    np.testing.assert_array_equal(first, bank.add(GRAY, 5.0, 1, 0.2))
+    np.testing.assert_array_equal(first, NoiseBank().add(GRAY, 5.0, 1, 0.2))
     noise = first.astype(float) - 120
     assert noise.std() == pytest.approx(5.0, rel=0.05)
     assert abs(noise.mean()) < 0.2
-    for other in (bank.add(GREY, 5.0, 2, 0.2), bank.add(GREY, 5.0, 1, 0.3)):
+    for other in (bank.add(GRAY, 5.0, 2, 0.2), bank.add(GRAY, 5.0, 1, 0.3)):
         between = np.corrcoef(noise.ravel(), other.ravel().astype(float))
         assert abs(between[0, 1]) < 0.05
 
 
 def test_noise_of_large_images_does_not_repeat_within_the_image():
-    grey = np.full((480, 640, 3), 120, dtype=np.uint8)
-    noise = NoiseBank().add(grey, 10.0, 0, 0.0).astype(float) - 120
+    gray = np.full((480, 640, 3), 120, dtype=np.uint8)
+    noise = NoiseBank().add(gray, 10.0, 0, 0.0).astype(float) - 120
     upper, lower = noise[:240].ravel(), noise[240:].ravel()
     assert abs(np.corrcoef(upper, lower)[0, 1]) < 0.02
 
@@ -85,22 +85,22 @@ def test_no_motion_is_no_blur():
 
 
 def test_composite_pastes_under_the_mask_only():
-    image = GREY.copy()
-    reflection = np.full_like(GREY, 200)
-    mask = np.zeros(GREY.shape[:2], dtype=np.uint8)
+    image = GRAY.copy()
+    reflection = np.full_like(GRAY, 200)
+    mask = np.zeros(GRAY.shape[:2], dtype=np.uint8)
     mask[10:20, 30:50] = 255
     composite_mirror(image, reflection, mask, [1.0, 0.5, 1.0], 0.0)
     assert image[15, 40, 0] == 200
     assert image[15, 40, 1] == round(200 * 0.5 ** (1 / 2.2))
     image[10:20, 30:50] = 120
-    np.testing.assert_array_equal(image, GREY)
+    np.testing.assert_array_equal(image, GRAY)
 
 
 def test_blurred_reflection_stays_within_the_mask():
-    image = GREY.copy()
-    reflection = GREY.copy()
+    image = GRAY.copy()
+    reflection = GRAY.copy()
     reflection[:, 40:] = 240
-    mask = np.zeros(GREY.shape[:2], dtype=np.uint8)
+    mask = np.zeros(GRAY.shape[:2], dtype=np.uint8)
     mask[:, 20:60] = 255
     composite_mirror(image, reflection, mask, [1.0, 1.0, 1.0], 2.0)
     assert 120 < image[30, 38, 0] < 240

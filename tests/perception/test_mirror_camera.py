@@ -186,7 +186,7 @@ def rod_hides(world, X_WM):
 
 
 def test_light_is_the_same_in_both_views(world):
-    """The table's colour near the drum, direct and in the mirror."""
+    """The table's color near the drum, direct and in the mirror."""
     world.set(yaw=-0.45, drum=[0.3, 0.1])
     X_WM = world.mirror()
     p_W = np.array([0.26, -0.02, 0.0])
@@ -200,7 +200,7 @@ def test_light_is_the_same_in_both_views(world):
         assert 0 < u < 319
         assert 0 < v < 239
         colors.append(image[round(v), round(u)])
-    # The surface is matt, so that its colour does not depend on the view.
+    # The surface is matt, so that its color does not depend on the view.
     np.testing.assert_allclose(colors[0], colors[1], atol=6)
 
 

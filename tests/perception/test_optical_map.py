@@ -33,13 +33,13 @@ def samples(the_map, n, seed=0):
     xy = np.random.default_rng(seed).uniform([0.2, -0.1], [0.34, 0.08], (n, 2))
     uv = the_map.target.image_of(xy, YAW, WIDE)
     p_W = the_map.source.marker(xy)
-    yaws = the_map.source.centring_yaw(p_W)
+    yaws = the_map.source.centering_yaw(p_W)
     v = [
         the_map.source.image_of(place[None], yaw)[0, 1]
         for place, yaw in zip(xy, yaws, strict=True)
     ]
     y = (np.array(v) - DIRECT.v_min) / (DIRECT.v_max - DIRECT.v_min)
-    return MIRRORED.normalise(uv), np.stack([y, yaws], -1), xy
+    return MIRRORED.normalize(uv), np.stack([y, yaws], -1), xy
 
 
 @pytest.mark.parametrize("camera", [None, FISHEYE])

@@ -100,7 +100,7 @@ STRIKE = frozenset(["affetto::right_hand", "drum::head"])
 
 
 @pytest.mark.parametrize("depth", [0.004, 0.010, 0.016])
-def test_the_hand_is_a_spring_of_600_newton_a_metre(scene, depth):
+def test_the_hand_is_a_spring_of_600_newton_a_meter(scene, depth):
     press(scene, depth)
     found = forces(scene)
     assert set(found) == {STRIKE}
@@ -133,7 +133,7 @@ def test_drum_and_table_do_not_push_each_other(scene):
     assert forces(scene) == {}
 
 
-def test_a_hard_fall_on_the_table_sinks_in_at_most_two_millimetres():
+def test_a_hard_fall_on_the_table_sinks_in_at_most_two_millimeters():
     """The forearm falls on the edge of the table, its muscles slack."""
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlant(
@@ -215,7 +215,7 @@ def test_what_is_rendered_follows_the_drum():
             camera, scene_graph.world_frame_id(), X_WC
         ).data[..., 0]
         v, u = np.nonzero(label == int(head.index()))
-        centre = world.head_center_position(plant, context)
-        p_C = X_WC.inverse() @ centre
+        center = world.head_center_position(plant, context)
+        p_C = X_WC.inverse() @ center
         expected = info.focal_x() * p_C[:2] / p_C[2] + [79.5, 59.5]
         assert [u.mean(), v.mean()] == pytest.approx(expected, abs=1.5)

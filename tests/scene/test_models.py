@@ -368,8 +368,8 @@ def test_the_camera_in_the_head_does_not_look_at_it_from_inside():
     assert names["forearm"] == set()
 
 
-def test_nothing_else_has_the_colour_of_the_marker():
-    """Green, the marker's colour, is the marker's alone."""
+def test_nothing_else_has_the_color_of_the_marker():
+    """Green, the marker's color, is the marker's alone."""
     for path in (models_dir() / "sdf").glob("*.sdf"):
         for visual in ElementTree.parse(path).getroot().iter("visual"):
             rgb = [float(c) for c in visual.find(".//diffuse").text.split()[:3]]

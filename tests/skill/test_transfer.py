@@ -200,7 +200,7 @@ def test_finds_the_map(skill, solver, mapping):
     assert_allclose(transfer.predict(seen_anew(Z)), skill_of(Z), atol=0.1)
 
 
-def test_eq_5_minimised_elsewhere(skill):
+def test_eq_5_minimized_elsewhere(skill):
     """Bare Eq. 5: a general-purpose search of the same starts is no better."""
     X, y = few(4)
     transfer = TransferRegressor(
@@ -477,9 +477,9 @@ def test_bad_data_are_named(skill):
         transfer.fit(X, y[:, :2])
     with pytest.raises(ValueError, match="X is constant"):
         transfer.fit(np.ones((5, 2)), y)
-    with pytest.raises(ValueError, match="X_unlabelled has 3 features"):
+    with pytest.raises(ValueError, match="X_unlabeled has 3 features"):
         transfer.fit(X, y, np.ones((5, 3)))
-    with pytest.raises(ValueError, match="X_unlabelled"):
+    with pytest.raises(ValueError, match="X_unlabeled"):
         transfer.fit(X, y, np.full((5, 2), np.nan))
     transfer.fit(X, y)
     with pytest.raises(ValueError, match="3 features"):

@@ -80,7 +80,7 @@ def test_pitches_are_the_zeros_of_the_bessel_functions():
     voice = DrumVoice(config)
     t, force = tap(3.0)
     a = config.membrane.radius
-    pressure = voice.synthesise(t, force, np.full_like(t, 0.6 * a))
+    pressure = voice.synthesize(t, force, np.full_like(t, 0.6 * a))
     axis, amplitude = spectrum(pressure[2000:], voice.rate)
     wave_speed = np.sqrt(
         config.membrane.tension / config.membrane.surface_density
@@ -130,17 +130,17 @@ def test_masses_and_gains_are_the_integrals_they_stand_for():
         assert modes.gain[i] == pytest.approx(expected.real, rel=1e-6)
 
 
-def test_a_hit_at_the_centre_sounds_only_modes_without_diameters():
+def test_a_hit_at_the_center_sounds_only_modes_without_diameters():
     config = ideal_config()
     voice = DrumVoice(config)
     t, force = tap()
     a = config.membrane.radius
-    centre = voice.synthesise(t, force, np.zeros_like(t))
-    aside = voice.synthesise(t, force, np.full_like(t, 0.5 * a))
+    center = voice.synthesize(t, force, np.zeros_like(t))
+    aside = voice.synthesize(t, force, np.full_like(t, 0.5 * a))
     modes = voice.membrane
     for i in range(8):
         frequency = modes.omega[i] / (2.0 * np.pi)
-        ratio = amplitude_at(centre[2000:], voice.rate, frequency) / (
+        ratio = amplitude_at(center[2000:], voice.rate, frequency) / (
             amplitude_at(aside[2000:], voice.rate, frequency)
         )
         if modes.order[i] == 0:
@@ -159,7 +159,7 @@ def test_a_hit_on_a_nodal_circle_leaves_its_mode_silent():
     second = 2.2954 * voice.membrane.omega[0] / (2.0 * np.pi)
     on, off = (
         amplitude_at(
-            voice.synthesise(t, force, np.full_like(t, place))[2000:],
+            voice.synthesize(t, force, np.full_like(t, place))[2000:],
             voice.rate,
             second,
         )
@@ -196,7 +196,7 @@ def test_one_mode_follows_its_differential_equation(hand_damping):
         ]
 
     t = np.arange(0.0, 0.3, 1e-3)
-    pressure = voice.synthesise(t, push(t), np.full_like(t, place))
+    pressure = voice.synthesize(t, push(t), np.full_like(t, place))
     fine = (np.arange(len(pressure)) - 0.5) / voice.rate
     solution = integrate.solve_ivp(
         derivative,
@@ -224,7 +224,7 @@ def test_the_ring_decays_at_the_rate_of_its_mode():
         )
     )
     t, force = tap(0.8)
-    pressure = voice.synthesise(t, force, np.zeros_like(t))[2400:8000]
+    pressure = voice.synthesize(t, force, np.zeros_like(t))[2400:8000]
     envelope = np.abs(signal.hilbert(pressure))[400:-400]
     slope = np.polyfit(
         np.arange(len(envelope)) / voice.rate, np.log(envelope), 1
@@ -236,15 +236,15 @@ def test_a_harder_hit_is_louder_in_proportion():
     config = VoiceConfig(membrane=MembraneConfig(hand_damping=0.0))
     voice = DrumVoice(config)
     t, force, place = strike()
-    soft = voice.synthesise(t, force, place)
-    hard = voice.synthesise(t, 3.0 * force, place)
+    soft = voice.synthesize(t, force, place)
+    hard = voice.synthesize(t, 3.0 * force, place)
     np.testing.assert_allclose(hard, 3.0 * soft, rtol=1e-6, atol=1e-9)
 
 
 def test_a_faster_hit_is_louder():
     voice = DrumVoice()
     loudness = [
-        np.abs(voice.synthesise(*strike(scale))).max()
+        np.abs(voice.synthesize(*strike(scale))).max()
         for scale in (0.5, 0.8, 1.2, 1.8)
     ]
     assert np.all(np.diff(loudness) > 0.0)
@@ -255,11 +255,11 @@ def test_a_soft_strike_is_heard_and_a_gentle_press_is_not():
     noise = voice.config.microphone_noise
     t, force, place = strike(0.7)
     assert 0.5 < force.max() < 5.0
-    assert np.abs(voice.synthesise(t, force, place)).max() > 50.0 * noise
+    assert np.abs(voice.synthesize(t, force, place)).max() > 50.0 * noise
     # The same force, reached in a second and left in a second.
     t = np.arange(0.0, 4.0, 1e-3)
     press = force.max() * np.sin(np.pi * np.clip((t - 1.0) / 2.0, 0, 1)) ** 2
-    pressure = voice.synthesise(t, press, np.full_like(t, 0.02))
+    pressure = voice.synthesize(t, press, np.full_like(t, 0.02))
     assert np.abs(pressure).max() < noise
 
 
@@ -274,9 +274,9 @@ def test_the_steps_of_the_simulation_do_not_ring():
     coarse = np.arange(0.0, 0.6, 1e-3)
     fine = np.arange(0.0, 0.599, 1.0 / voice.rate)
     place = 0.02
-    heard = voice.synthesise(coarse, push(coarse), np.full_like(coarse, place))
-    truth = voice.synthesise(fine, push(fine), np.full_like(fine, place))
-    held = voice.synthesise(
+    heard = voice.synthesize(coarse, push(coarse), np.full_like(coarse, place))
+    truth = voice.synthesize(fine, push(fine), np.full_like(fine, place))
+    held = voice.synthesize(
         fine,
         push(coarse)[np.floor(fine * 1e3 + 1e-9).astype(int)],
         np.full_like(fine, place),
@@ -317,8 +317,8 @@ def test_a_touch_between_samples_sounds_as_it_would_without_sampling(
 
     coarse = np.arange(0.0, 0.5, 1e-3)
     fine = np.arange(0.0, 0.499, 1.0 / voice.rate)
-    heard = voice.synthesise(coarse, push(coarse), np.full_like(coarse, 0.02))
-    truth = voice.synthesise(fine, push(fine), np.full_like(fine, 0.02))
+    heard = voice.synthesize(coarse, push(coarse), np.full_like(coarse, 0.02))
+    truth = voice.synthesize(fine, push(fine), np.full_like(fine, 0.02))
     size = min(len(heard), len(truth))
     error = np.abs(heard[:size] - truth[:size]).max()
     # Of what a kink of this force would give.
@@ -329,12 +329,12 @@ def test_a_hand_that_stays_damps_the_head():
     voice = DrumVoice()
     t, force = tap(1.0)
     place = np.full_like(t, 0.02)
-    free = voice.synthesise(t, force, place)
+    free = voice.synthesize(t, force, place)
     resting = force + np.where(t > 0.05, 3.0, 0.0) * np.clip(
         (t - 0.05) / 0.05, 0.0, 1.0
     )
     # Only what the tap adds, so that coming to rest does not count.
-    damped = voice.synthesise(t, resting, place) - voice.synthesise(
+    damped = voice.synthesize(t, resting, place) - voice.synthesize(
         t, resting - force, place
     )
     late = slice(round(0.25 * voice.rate), round(0.4 * voice.rate))
@@ -344,7 +344,7 @@ def test_a_hand_that_stays_damps_the_head():
 def test_a_hand_that_was_there_before_makes_no_sound():
     voice = DrumVoice()
     t = np.arange(0.0, 0.5, 1e-3)
-    pressure = voice.synthesise(t, np.full_like(t, 4.0), np.full_like(t, 0.02))
+    pressure = voice.synthesize(t, np.full_like(t, 4.0), np.full_like(t, 0.02))
     assert np.abs(pressure).max() < 1e-9
 
 
@@ -360,17 +360,17 @@ def test_places_sound_different():
     t, force, _ = strike()
     none = np.zeros_like(t)
     a = voice.config.membrane.radius
-    centre = voice.synthesise(t, force, none)
-    edge = voice.synthesise(t, force, np.full_like(t, 0.85 * a))
-    shell = voice.synthesise(t, none, none, shell_force=force)
-    table = voice.synthesise(t, none, none, table_force=force)
-    assert np.std(centre) > 2.0 * np.std(edge)
+    center = voice.synthesize(t, force, none)
+    edge = voice.synthesize(t, force, np.full_like(t, 0.85 * a))
+    shell = voice.synthesize(t, none, none, shell_force=force)
+    table = voice.synthesize(t, none, none, table_force=force)
+    assert np.std(center) > 2.0 * np.std(edge)
     assert np.std(edge) > 4.0 * np.std(table)
     assert np.std(edge) > 20.0 * np.std(shell)
     t_tap, touch = tap()
     overtones = []
     for place in (0.0, 0.85 * a):
-        ring = voice.synthesise(t_tap, touch, np.full_like(t_tap, place))[2000:]
+        ring = voice.synthesize(t_tap, touch, np.full_like(t_tap, place))[2000:]
         fundamental, overtone = (
             amplitude_at(ring, rate, voice.membrane.omega[i] / (2.0 * np.pi))
             for i in (0, 1)
@@ -378,9 +378,9 @@ def test_places_sound_different():
         overtones.append(overtone / fundamental)
     assert overtones[1] > 10.0 * overtones[0]
     # A knock on wood is duller, one on the shell is brighter than the drum.
-    assert centroid(table, rate) < centroid(centre, rate)
-    assert centroid(shell, rate) > centroid(centre, rate)
-    rim_shot = voice.synthesise(
+    assert centroid(table, rate) < centroid(center, rate)
+    assert centroid(shell, rate) > centroid(center, rate)
+    rim_shot = voice.synthesize(
         t, 0.5 * force, np.full_like(t, 0.85 * a), shell_force=0.5 * force
     )
     assert centroid(rim_shot, rate) != pytest.approx(
@@ -393,7 +393,7 @@ def test_hiss_follows_the_flow():
     t = np.arange(0.0, 4.0, 1e-3)
     none = np.zeros_like(t)
     flow = np.where(t < 2.0, 1e-4, 3e-4)
-    sound = voice.synthesise(
+    sound = voice.synthesize(
         t, none, none, mass_flow=flow, rng=np.random.default_rng(0)
     )
     half = len(sound) // 2
@@ -401,7 +401,7 @@ def test_hiss_follows_the_flow():
     assert early == pytest.approx(voice.config.hiss.gain * 1e-4, rel=0.05)
     assert late / early == pytest.approx(3.0, rel=0.05)
     # Four valves at half the flow are as loud as one: jets add in power.
-    four = voice.synthesise(
+    four = voice.synthesize(
         t,
         none,
         none,
@@ -420,7 +420,7 @@ def test_the_same_seed_gives_the_same_noise():
     flow = np.full_like(t, 1e-4)
 
     def record(seed):
-        return DrumVoice().synthesise(
+        return DrumVoice().synthesize(
             t,
             force,
             place,
@@ -431,11 +431,11 @@ def test_the_same_seed_gives_the_same_noise():
     first, again, other = record(1), record(1), record(2)
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
-    clean = voice.synthesise(t, force, place, mass_flow=flow)
-    assert np.array_equal(clean, voice.synthesise(t, force, place))
+    clean = voice.synthesize(t, force, place, mass_flow=flow)
+    assert np.array_equal(clean, voice.synthesize(t, force, place))
     quiet = slice(0, 1600)
     assert not clean[quiet].any()
-    silent_valves = voice.synthesise(
+    silent_valves = voice.synthesize(
         t, force, place, rng=np.random.default_rng(1)
     )
     assert np.std(silent_valves - clean) == pytest.approx(1e-3, rel=0.02)
@@ -443,8 +443,8 @@ def test_the_same_seed_gives_the_same_noise():
 
 def test_another_rate_gives_the_same_sound():
     t, force, place = strike()
-    low = DrumVoice(VoiceConfig(rate=16000.0)).synthesise(t, force, place)
-    high = DrumVoice(VoiceConfig(rate=44100.0)).synthesise(t, force, place)
+    low = DrumVoice(VoiceConfig(rate=16000.0)).synthesize(t, force, place)
+    high = DrumVoice(VoiceConfig(rate=44100.0)).synthesize(t, force, place)
     assert len(low) == 16 * (len(t) - 1) + 1
     resampled = np.interp(
         np.arange(len(low)) / 16000.0, np.arange(len(high)) / 44100.0, high
@@ -463,7 +463,7 @@ def test_fifty_times_real_time():
 
     def once():
         start = time.process_time()
-        voice.synthesise(t, force, place, force, force, flow, rng)
+        voice.synthesize(t, force, place, force, force, flow, rng)
         return time.process_time() - start
 
     once()
@@ -520,7 +520,7 @@ GOOD = {
 def test_arrays_that_do_not_fit(field, value, message):
     voice = DrumVoice()
     with pytest.raises(InputError, match=message):
-        voice.synthesise(**{**GOOD, field: value}, rng=np.random.default_rng(0))
+        voice.synthesize(**{**GOOD, field: value}, rng=np.random.default_rng(0))
 
 
 @pytest.mark.parametrize(

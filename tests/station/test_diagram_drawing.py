@@ -91,7 +91,7 @@ def test_class_stands_without_its_module(diagram):
     assert "drake_affetto.pneumatics" not in source
 
 
-def test_stage_gives_the_colour(diagram):
+def test_stage_gives_the_color(diagram):
     colored = f'BGCOLOR="{STAGE_COLORS["pneumatics"]}"'
     assert graphviz_source(diagram, max_depth=1).count(colored) == 0
     opened = graphviz_source(diagram, max_depth=2)

@@ -4,7 +4,7 @@ import numpy as np
 
 from drake_affetto.geometry import optics
 from drake_affetto.geometry.optics import FisheyeCamera, PinholeCamera
-from drake_affetto.perception.camera_model import Mirror, SightModel
+from drake_affetto.perception.camera_model import CameraModel, Mirror
 from drake_affetto.perception.config import rotation_matrix
 
 PINHOLE = PinholeCamera.from_fov(320, 240, 0.9)
@@ -26,7 +26,7 @@ def make(camera=PINHOLE, pan=0.0, roll=0.0, tilt=0.0):
     X_WA = optics.make_pose(
         rotation_matrix([tilt, 0.5 * tilt, 0.2]), [0, 0, 0.1]
     )
-    return SightModel(
+    return CameraModel(
         camera,
         X_WA,
         np.array([0.0, 0.0, 1.0]),

@@ -18,14 +18,28 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo
 import pytest
 
+from drake_affetto.experiments.workspace import WorkspaceConfig
+from drake_affetto.geometry.optics import (
+    PinholeCamera,
+    disc_outline,
+    points_in_frame,
+    polygon_area,
+    reflect_points,
+)
 from drake_affetto.scene import world
-from drake_affetto.scene.sight import View, disc, polygon_area, reflect
-from drake_affetto.scene.workspace import WorkspaceConfig
 
 CONFIG = WorkspaceConfig()
-VIEW = View(CONFIG.width, CONFIG.height, CONFIG.fov_y)
-# Corners and middle of what the workspace leaves with a centimetre to spare.
+VIEW = PinholeCamera.from_fov(CONFIG.width, CONFIG.height, CONFIG.fov_y)
+# Corners and middle of what the workspace leaves with a centimeter to spare.
 PLACES = [*itertools.product([0.195, 0.333], [-0.195, 0.002]), (0.26, -0.1)]
+
+
+def project(X_WC, p_W):
+    return VIEW.project(points_in_frame(X_WC, p_W))
+
+
+def disc(center, radius):
+    return disc_outline(center, [0.0, 0.0, 1.0], radius)
 
 
 class Camera:
@@ -48,7 +62,7 @@ class Camera:
         self.diagram = builder.Build()
         self.root = self.diagram.CreateDefaultContext()
         self.context = self.plant.GetMyMutableContextFromRoot(self.root)
-        w, h, f = VIEW.width, VIEW.height, VIEW.focal
+        w, h, f = VIEW.width, VIEW.height, VIEW.focal_x
         self.core = CameraInfo(w, h, f, f, w / 2, h / 2)
 
     def _query(self):
@@ -62,7 +76,7 @@ class Camera:
         return ColorRenderCamera(core)
 
     def marker_area(self, renderer, X_WC):
-        """Pixels of the marker's colour."""
+        """Pixels of the marker's color."""
         image = self._query().RenderColorImage(
             self._camera(renderer), self.scene_graph.world_frame_id(), X_WC
         )
@@ -94,7 +108,7 @@ def reset(camera):
 
 
 @pytest.mark.parametrize("xy", PLACES)
-def test_the_marker_is_seen_whole_once_centred(camera, reset, xy):
+def test_the_marker_is_seen_whole_once_centered(camera, reset, xy):
     plant, context = camera.plant, camera.context
     world.set_drum_position(plant, context, xy)
     marker = world.marker_position(plant, context)
@@ -102,9 +116,9 @@ def test_the_marker_is_seen_whole_once_centred(camera, reset, xy):
     for yaw in np.linspace(-0.5, 0.5, 401):
         world.set_posture(plant, context, {CONFIG.yaw_joint: yaw})
         X_WC = camera.pose("eye_camera")
-        if VIEW.project(X_WC, marker[None])[0, 0] >= VIEW.width / 2:
+        if project(X_WC, marker[None])[0, 0] >= VIEW.width / 2:
             break
-    area = polygon_area(VIEW.project(X_WC, rim))
+    area = polygon_area(project(X_WC, rim))
     seen = camera.marker_area("direct", RigidTransform(X_WC))
     assert seen == pytest.approx(area, rel=0.03)
     mirror = plant.GetModelInstanceByName("mirror")
@@ -119,7 +133,7 @@ def test_enough_of_the_marker_is_seen_before_to_turn_to_it(camera, reset, xy):
     X_WC = camera.pose("eye_camera")
     marker = world.marker_position(plant, context)
     area = polygon_area(
-        VIEW.project(X_WC, disc(marker, world.marker_radius(plant, context)))
+        project(X_WC, disc(marker, world.marker_radius(plant, context)))
     )
     seen = camera.marker_area("direct", RigidTransform(X_WC))
     assert seen > 0.5 * area
@@ -132,11 +146,13 @@ def test_the_marker_is_seen_whole_in_the_mirror(camera, reset, xy):
     world.set_posture(plant, context, CONFIG.mirror_posture)
     X_WC, X_WM = camera.pose("eye_camera"), camera.pose("mirror")
     marker = world.marker_position(plant, context)
-    rim = reflect(X_WM, disc(marker, world.marker_radius(plant, context)))
-    area = polygon_area(VIEW.project(X_WC, rim))
+    rim = reflect_points(
+        X_WM, disc(marker, world.marker_radius(plant, context))
+    )
+    area = polygon_area(project(X_WC, rim))
     # The virtual camera: its image is the mirror's, flipped left to right.
-    origin = reflect(X_WM, X_WC[:3, 3])
-    tips = reflect(X_WM, X_WC[:3, 3] + X_WC[:3, :3].T)
+    origin = reflect_points(X_WM, X_WC[:3, 3])
+    tips = reflect_points(X_WM, X_WC[:3, 3] + X_WC[:3, :3].T)
     axes = (tips - origin).T * [-1, 1, 1]
     X_WV = np.eye(4)
     X_WV[:3, :3], X_WV[:3, 3] = axes, origin

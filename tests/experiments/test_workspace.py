@@ -4,15 +4,30 @@ import numpy as np
 import pytest
 
 from drake_affetto.common.errors import InputError
-from drake_affetto.scene import world
-from drake_affetto.scene.sight import View, disc, on_panel, reflect
-from drake_affetto.scene.workspace import (
+from drake_affetto.experiments.workspace import (
     WorkspaceConfig,
     compute_workspace,
     largest_box,
 )
+from drake_affetto.geometry.optics import (
+    PinholeCamera,
+    disc_outline,
+    points_in_frame,
+    reflect_points,
+)
+from drake_affetto.perception.camera_model import Mirror, seen_in_mirror
+from drake_affetto.scene import world
 
 CONFIG = WorkspaceConfig(step=0.03)
+CAMERA = PinholeCamera.from_fov(CONFIG.width, CONFIG.height, CONFIG.fov_y)
+
+
+def project(X_WC, p_W):
+    return CAMERA.project(points_in_frame(X_WC, p_W))
+
+
+def disc(center, radius):
+    return disc_outline(center, [0.0, 0.0, 1.0], radius)
 
 
 @pytest.fixture(scope="module")
@@ -84,9 +99,8 @@ def test_striking_postures_strike(workspace, scene):
         assert down > np.cos(CONFIG.palm_tilt)
 
 
-def test_the_yaw_centres_the_marker(workspace, scene):
+def test_the_yaw_centers_the_marker(workspace, scene):
     plant, context = scene.plant, scene.context
-    view = View(CONFIG.width, CONFIG.height, CONFIG.fov_y)
     eye = plant.GetFrameByName("eye_camera")
     low, high = world.joint_limits(plant, [CONFIG.yaw_joint])
     for i, j, xy in _positions(workspace, workspace.sees)[::5]:
@@ -96,17 +110,16 @@ def test_the_yaw_centres_the_marker(workspace, scene):
         world.set_posture(plant, context, {CONFIG.yaw_joint: yaw})
         X_WC = eye.CalcPoseInWorld(context).GetAsMatrix4()
         marker = world.marker_position(plant, context)
-        pixel = view.project(X_WC, marker[None])[0]
+        pixel = project(X_WC, marker[None])[0]
         assert pixel == pytest.approx(workspace.pixels[i, j], abs=1e-6)
         assert pixel[0] == pytest.approx(0.5 * (CONFIG.width - 1), abs=1e-3)
         rim = disc(marker, world.marker_radius(plant, context))
-        assert view.inside(view.project(X_WC, rim)).all()
+        assert CAMERA.inside(project(X_WC, rim)).all()
 
 
 def test_looking_down_the_mirror_is_out_of_sight(workspace, scene):
     """No light from the mirror disturbs the direct view, however it turns."""
     plant, context = scene.plant, scene.context
-    view = View(CONFIG.width, CONFIG.height, CONFIG.fov_y)
     eye = plant.GetFrameByName("eye_camera")
     X_WM = plant.GetFrameByName("mirror").CalcPoseInWorld(context)
     half = 0.5 * world.mirror_size(plant, context) + 0.015
@@ -116,12 +129,11 @@ def test_looking_down_the_mirror_is_out_of_sight(workspace, scene):
     for yaw in workspace.yaw[workspace.usable]:
         world.set_posture(plant, context, {CONFIG.yaw_joint: yaw})
         X_WC = eye.CalcPoseInWorld(context).GetAsMatrix4()
-        assert not view.inside(view.project(X_WC, points)).any()
+        assert not CAMERA.inside(project(X_WC, points)).any()
 
 
 def test_looking_into_the_mirror_the_drum_is_out_of_sight(workspace, scene):
     plant, context = scene.plant, scene.context
-    view = View(CONFIG.width, CONFIG.height, CONFIG.fov_y)
     world.set_posture(plant, context, CONFIG.mirror_posture)
     eye = plant.GetFrameByName("eye_camera")
     X_WC = eye.CalcPoseInWorld(context).GetAsMatrix4()
@@ -131,13 +143,14 @@ def test_looking_into_the_mirror_the_drum_is_out_of_sight(workspace, scene):
     for i, j, xy in _positions(workspace, workspace.usable):
         world.set_drum_position(plant, context, xy)
         head = world.head_center_position(plant, context)
-        hoop = disc(np.array([head, head - [0, 0, 0.07]]), 0.068)
-        assert not view.inside(view.project(X_WC, hoop.reshape(-1, 3))).any()
+        for level in (head, head - [0, 0, 0.07]):
+            hoop = disc(level, 0.068)
+            assert not CAMERA.inside(project(X_WC, hoop)).any()
         marker = world.marker_position(plant, context)
         rim = disc(marker, world.marker_radius(plant, context))
-        assert on_panel(X_WM, size, X_WC[:3, 3], rim).all()
-        pixels = view.project(X_WC, reflect(X_WM, rim))
-        assert view.inside(pixels, CONFIG.edge).all()
+        assert seen_in_mirror(X_WC[:3, 3], rim, Mirror(X_WM, *size)).all()
+        pixels = project(X_WC, reflect_points(X_WM, rim))
+        assert CAMERA.inside(pixels, CONFIG.edge).all()
         assert workspace.mirror_area[i, j] >= 100
 
 

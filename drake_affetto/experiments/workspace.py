@@ -14,20 +14,26 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
 from drake_affetto.common.errors import require, require_range
+from drake_affetto.common.typing import Array, Mask
 from drake_affetto.geometry.kinematics import SerialChain, solve_position
-from drake_affetto.scene import world
-from drake_affetto.scene.sight import (
-    View,
-    disc,
-    on_panel,
+from drake_affetto.geometry.optics import (
+    PinholeCamera,
+    disc_outline,
+    points_in_frame,
     polygon_area,
-    reflect,
+    reflect_points,
 )
+from drake_affetto.perception.camera_model import (
+    CameraModel,
+    Mirror,
+    seen_in_mirror,
+)
+from drake_affetto.scene import world
 
-Array = np.ndarray
-
-# What may touch what when the hand strikes.
+# Bodies that may touch each other when the hand strikes.
 _STRIKE = {"affetto::right_hand", "drum::head"}
+
+_UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclasses.dataclass
@@ -109,7 +115,7 @@ class WorkspaceConfig:
 
 @dataclasses.dataclass(frozen=True)
 class Workspace:
-    """What holds at each position (x[i], y[j]) of the drum's centre.
+    """What holds at each position (x[i], y[j]) of the drum's center.
 
     Attributes:
         x: (nx,) world x [m].
@@ -120,8 +126,8 @@ class Workspace:
         sees: the whole marker is in the image, before and after the upper
             body has turned to it; then the mirror is out of the image.
         sees_mirror: the whole marker is in the mirror's image, large enough.
-        yaw: (nx, ny) yaw [rad] that centres the marker; NaN if none does.
-        pixels: (nx, ny, 2) the marker's centre in the image, once centred.
+        yaw: (nx, ny) yaw [rad] that centers the marker; NaN if none does.
+        pixels: (nx, ny, 2) the marker's center in the image, once centered.
         mirror_pixels: (nx, ny, 2) the same in the mirror, from the fixed yaw.
         mirror_area: (nx, ny) area [px²] of the marker in the mirror.
         strike: (nx, ny, n) posture [rad] of the active joints with the hand
@@ -130,10 +136,10 @@ class Workspace:
 
     x: Array
     y: Array
-    reach: Array
-    reach_mirror: Array
-    sees: Array
-    sees_mirror: Array
+    reach: Mask
+    reach_mirror: Mask
+    sees: Mask
+    sees_mirror: Mask
     yaw: Array
     pixels: Array
     mirror_pixels: Array
@@ -141,37 +147,9 @@ class Workspace:
     strike: Array
 
     @property
-    def usable(self) -> Array:
+    def usable(self) -> Mask:
         """(nx, ny), where direct and mirrored drumming are both possible."""
         return self.reach & self.reach_mirror & self.sees & self.sees_mirror
-
-
-def _full(
-    chain: SerialChain, default: Mapping[str, float], change: Mapping
-) -> Array:
-    return chain.posture({**default, **change})
-
-
-def _centring_yaw(
-    chain: SerialChain, posture: Array, yaw_index: int, targets: Array
-) -> Array:
-    """Yaw (m,) [rad] that centres targets (m, 3) left to right, else NaN."""
-
-    def sideways(yaw: Array) -> Array:
-        q = np.tile(posture, (len(targets), 1))
-        q[:, yaw_index] = yaw
-        X_WC = chain.pose(q)
-        return np.einsum("mi,mi->m", targets - X_WC[:, :3, 3], X_WC[:, :3, 0])
-
-    low = np.full(len(targets), chain.lower[yaw_index])
-    high = np.full(len(targets), chain.upper[yaw_index])
-    # Turning left moves the target to the right in the image.
-    bracketed = (sideways(low) <= 0) & (sideways(high) >= 0)
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        left = sideways(middle) < 0
-        low, high = np.where(left, middle, low), np.where(left, high, middle)
-    return np.where(bracketed, 0.5 * (low + high), np.nan)
 
 
 def _panel(X_WM: Array, size: Array, frame: float = 0.015) -> Array:
@@ -203,13 +181,14 @@ def compute_workspace(
     """Examines a grid of drum positions over the whole table.
 
     Args:
-        plant: with a world (`world.add_world`), finalized and connected to
-            its SceneGraph.
-        context: the plant's, in a root context; its posture and the drum's
-            position are changed and put back.
+        plant: Plant with a world (`world.add_world`), finalized and connected
+            to its SceneGraph.
+        context: Context of the plant, in a root context; its posture and the
+            drum's position are changed and put back.
+        config: What is asked of a position.
 
     Raises:
-        InputError: for a configuration or posture that does not fit.
+        InputError: If the configuration or a posture does not fit.
     """
     config.check("workspace")
     for name in ("direct_posture", "mirror_posture"):
@@ -222,50 +201,152 @@ def compute_workspace(
     xy = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     old_xy = world.get_drum_position(plant, context)
     old_posture = world.get_posture(plant, context)
-    rise = world.marker_position(plant, context) - [*old_xy, 0.0]
-    marker = np.column_stack([xy, np.full(len(xy), rise[2])])
-    head_z = world.head_center_position(plant, context)[2]
     default = {
         name: world.get_joint(plant, name).get_default_angle()
         for name in world.joint_names(plant)
     }
+    direct = default | config.direct_posture
+    facing = default | config.mirror_posture
+    seen = _see(plant, context, config, xy, direct, facing)
+    turned = _Postures(direct, config.yaw_joint, seen.yaw)
+    reach, strike = _reach(plant, context, config, xy, turned)
+    reach_mirror, _ = _reach(plant, context, config, xy, _Postures(facing))
+    world.set_posture(plant, context, old_posture)
+    world.set_drum_position(plant, context, old_xy)
+    return Workspace(
+        x=x,
+        y=y,
+        reach=reach.reshape(shape),
+        reach_mirror=reach_mirror.reshape(shape),
+        sees=seen.direct.reshape(shape),
+        sees_mirror=seen.mirrored.reshape(shape),
+        yaw=seen.yaw.reshape(shape),
+        pixels=seen.pixels.reshape(*shape, 2),
+        mirror_pixels=seen.mirror_pixels.reshape(*shape, 2),
+        mirror_area=seen.mirror_area.reshape(shape),
+        strike=strike.reshape(*shape, -1),
+    )
 
-    # Sight
+
+@dataclasses.dataclass(frozen=True)
+class _Seen:
+    """How the marker is seen at m positions of the drum.
+
+    Attributes:
+        direct: Whether it is seen well directly (m,).
+        mirrored: Whether it is seen well in the mirror (m,).
+        yaw: Yaw that centers it (m,), rad; NaN if none does.
+        pixels: Its center once centered (m, 2), px.
+        mirror_pixels: Its center in the mirror (m, 2), px.
+        mirror_area: Its area in the mirror (m,), px².
+    """
+
+    direct: Mask
+    mirrored: Mask
+    yaw: Array
+    pixels: Array
+    mirror_pixels: Array
+    mirror_area: Array
+
+
+def _see(
+    plant: MultibodyPlant,
+    context: Context,
+    config: WorkspaceConfig,
+    xy: Array,
+    direct: Mapping[str, float],
+    facing: Mapping[str, float],
+) -> _Seen:
+    """How the marker is seen in both postures."""
+    eye = world.serial_chain(plant, "eye_camera")
+    rise = world.marker_position(plant, context)[2]
+    radius = world.marker_radius(plant, context)
+    camera = PinholeCamera.from_fov(config.width, config.height, config.fov_y)
+    model = CameraModel.from_chain(
+        camera, eye, config.yaw_joint, dict(direct), rise, radius
+    )
+    marker = model.marker(xy)
+    rim = marker[:, None] + disc_outline(np.zeros(3), _UP, radius)
     X_WM = plant.GetFrameByName("mirror").CalcPoseInWorld(context)
     X_WM = X_WM.GetAsMatrix4()
-    panel = world.mirror_size(plant, context)
-    eye = world.serial_chain(plant, "eye_camera")
-    view = View(config.width, config.height, config.fov_y)
-    rim = disc(marker, world.marker_radius(plant, context))
-    posture = _full(eye, default, config.direct_posture)
-    turn = eye.names.index(config.yaw_joint)
-    yaw = _centring_yaw(eye, posture, turn, marker)
-    gap = config.joint_margin * (eye.upper[turn] - eye.lower[turn])
-    turned = np.tile(posture, (len(xy), 1))
-    turned[:, turn] = np.nan_to_num(yaw)
-    X_WC = eye.pose(turned)
-    pixels = view.project(X_WC, marker[:, None])[:, 0]
+    size = world.mirror_size(plant, context)
+
+    def project(X_WC: Array, p_W: Array) -> Array:
+        return camera.project(points_in_frame(X_WC, p_W))
+
+    # Directly, before and after the upper body has turned to the marker.
+    yaw = model.centering_yaw(marker)
+    gap = config.joint_margin * (model.yaw_max - model.yaw_min)
     with np.errstate(invalid="ignore"):
-        in_range = (yaw > eye.lower[turn] + gap) & (yaw < eye.upper[turn] - gap)
+        yaw[(yaw < model.yaw_min) | (yaw > model.yaw_max)] = np.nan
+        in_range = (yaw > model.yaw_min + gap) & (yaw < model.yaw_max - gap)
+    X_WC = np.stack([model.camera_pose(each) for each in np.nan_to_num(yaw)])
+    start = model.camera_pose(direct[config.yaw_joint])
     sees = (
         in_range
-        & view.inside(view.project(X_WC, rim), config.edge).all(axis=-1)
-        & view.inside(view.project(eye.pose(posture), rim)).all(axis=-1)
-        & ~view.inside(view.project(X_WC, _panel(X_WM, panel))).any(axis=-1)
+        & camera.inside(project(X_WC, rim), config.edge).all(axis=-1)
+        & camera.inside(project(start, rim)).all(axis=-1)
+        & ~camera.inside(project(X_WC, _panel(X_WM, size))).any(axis=-1)
     )
-    X_WC = eye.pose(_full(eye, default, config.mirror_posture))
-    image = reflect(X_WM, rim)
-    rim_pixels = view.project(X_WC, image)
+    # In the mirror, from the posture that faces it.
+    facing_eye = eye.pose(eye.posture(facing))
+    rim_pixels = project(facing_eye, reflect_points(X_WM, rim))
     area = polygon_area(rim_pixels)
+    mirror = Mirror(X_WM, *size)
     with np.errstate(invalid="ignore"):
         sees_mirror = (
-            view.inside(rim_pixels, config.edge).all(axis=-1)
-            & on_panel(X_WM, panel, X_WC[:3, 3], rim).all(axis=-1)
+            camera.inside(rim_pixels, config.edge).all(axis=-1)
+            & seen_in_mirror(facing_eye[:3, 3], rim, mirror).all(axis=-1)
             & (area >= config.area)
         )
-    mirror_pixels = view.project(X_WC, reflect(X_WM, marker))
+    return _Seen(
+        direct=sees,
+        mirrored=sees_mirror,
+        yaw=yaw,
+        pixels=project(X_WC, marker[:, None])[:, 0],
+        mirror_pixels=project(facing_eye, reflect_points(X_WM, marker)),
+        mirror_area=area,
+    )
 
-    # Reach
+
+@dataclasses.dataclass(frozen=True)
+class _Postures:
+    """Postures from which the hand sets out, one for each position.
+
+    Attributes:
+        posture: Angle of each joint, rad.
+        turning: Joint that has turned to the drum; empty for none.
+        angle: Its angle at each position (m,), rad; NaN where it stays.
+    """
+
+    posture: Mapping[str, float]
+    turning: str = ""
+    angle: Array | None = None
+
+    def of(self, chain: SerialChain, count: int) -> Array:
+        """Postures (count, n) of the chain's joints, rad."""
+        rest = np.tile(chain.posture(self.posture), (count, 1))
+        if self.angle is not None:
+            turn = chain.names.index(self.turning)
+            rest[:, turn] = np.where(
+                np.isnan(self.angle), rest[:, turn], self.angle
+            )
+        return rest
+
+
+def _reach(
+    plant: MultibodyPlant,
+    context: Context,
+    config: WorkspaceConfig,
+    xy: Array,
+    postures: _Postures,
+) -> tuple[Mask, Array]:
+    """Where the hand can strike the head from above.
+
+    Returns:
+        Whether it can (m,), and the striking postures of the active joints
+        (m, n), rad.
+    """
     palm = world.serial_chain(plant, "right_palm")
     weights = np.array(
         [
@@ -278,62 +359,41 @@ def compute_workspace(
         ]
     )
     middle = 0.5 * (palm.lower + palm.upper)
+    rest = postures.of(palm, len(xy))
+    head = world.head_center_position(plant, context)[2]
     hand = world.hand_radius(plant, context)
-    heights = (hand - config.press, hand + config.hover)
-    turn = palm.names.index(config.yaw_joint)
-    reaches: list[Array] = []
-    strike = np.full((*shape, len(config.active_joints)), np.nan)
-    for change in (config.direct_posture, config.mirror_posture):
-        rest = np.tile(_full(palm, default, change), (len(xy), 1))
-        if change is config.direct_posture:
-            rest[:, turn] = np.where(np.isnan(yaw), rest[:, turn], yaw)
-        reach = np.ones(len(xy), dtype=bool)
-        for height in heights:
-            target = np.column_stack([xy, np.full(len(xy), head_z + height)])
-            q, left = solve_position(
-                palm, target, rest, weights, margin=config.joint_margin
-            )
-            # A joint that stuck at its limit may need another beginning.
-            again = np.flatnonzero(left > 1e-3)
-            q[again], left[again] = solve_position(
-                palm,
-                target[again],
-                rest[again],
-                weights,
-                start=np.where(weights > 0, middle, rest[again]),
-                margin=config.joint_margin,
-                comfort=0.0,
-            )
-            down = -palm.pose(q)[:, 2, 2]
-            reach &= (left < 1e-3) & (down > np.cos(config.palm_tilt))
-            for i in np.flatnonzero(reach):
-                for name, angle in zip(palm.names, q[i], strict=True):
-                    world.get_joint(plant, name).set_angle(context, angle)
-                world.set_drum_position(plant, context, xy[i])
-                reach[i] = not _collides(plant, context)
-            if not reaches and height == heights[0]:
-                active = palm.indices(config.active_joints)
-                strike = q[:, active].reshape(*shape, -1)
-        reaches.append(reach)
-    world.set_posture(plant, context, old_posture)
-    world.set_drum_position(plant, context, old_xy)
-    return Workspace(
-        x=x,
-        y=y,
-        reach=reaches[0].reshape(shape),
-        reach_mirror=reaches[1].reshape(shape),
-        sees=sees.reshape(shape),
-        sees_mirror=sees_mirror.reshape(shape),
-        yaw=yaw.reshape(shape),
-        pixels=pixels.reshape(*shape, 2),
-        mirror_pixels=mirror_pixels.reshape(*shape, 2),
-        mirror_area=area.reshape(shape),
-        strike=strike,
-    )
+    reach = np.ones(len(xy), dtype=bool)
+    struck = []
+    # Pressed into the head, and above it before and after the stroke.
+    for height in (hand - config.press, hand + config.hover):
+        target = np.column_stack([xy, np.full(len(xy), head + height)])
+        q, left = solve_position(
+            palm, target, rest, weights, margin=config.joint_margin
+        )
+        # A joint that stuck at its limit may need another beginning.
+        again = np.flatnonzero(left > 1e-3)
+        q[again], left[again] = solve_position(
+            palm,
+            target[again],
+            rest[again],
+            weights,
+            start=np.where(weights > 0, middle, rest[again]),
+            margin=config.joint_margin,
+            comfort=0.0,
+        )
+        down = -palm.pose(q)[:, 2, 2]
+        reach &= (left < 1e-3) & (down > np.cos(config.palm_tilt))
+        for i in np.flatnonzero(reach):
+            for name, angle in zip(palm.names, q[i], strict=True):
+                world.get_joint(plant, name).set_angle(context, angle)
+            world.set_drum_position(plant, context, xy[i])
+            reach[i] = not _collides(plant, context)
+        struck.append(q[:, palm.indices(config.active_joints)])
+    return reach, struck[0]
 
 
 def largest_box(
-    x: Array, y: Array, mask: Array, margin: float = 0.0
+    x: Array, y: Array, mask: Mask, margin: float = 0.0
 ) -> tuple[Array, Array]:
     """The largest box, by area, of which every grid point is in `mask`.
 
