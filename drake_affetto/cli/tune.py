@@ -72,6 +72,7 @@ def run(args: argparse.Namespace) -> int:
 
     from rich.console import Console
 
+    from drake_affetto.report import write_report
     from drake_affetto.tuning.plan import load_plan
     from drake_affetto.tuning.study import run_tune
 
@@ -93,6 +94,7 @@ def run(args: argparse.Namespace) -> int:
             restart=args.restart,
             console=console,
         )
+    write_report([out], out / "study.html")
     _print_table(results, console)
     console.print(
         f"Gains, results and the study's page (study.html) are in {out}"

@@ -26,6 +26,7 @@ from drake_affetto.report.sections import (
     summary,
     toy,
     transfer,
+    tuning,
 )
 from drake_affetto.report.study_folder import StudyFolder
 from drake_affetto.report.style import DARK, LIGHT
@@ -40,6 +41,7 @@ _SECTIONS: tuple[Callable[[ReportData], Section | None], ...] = (
     scenarios.make,
     conditions.make,
     toy.make,
+    tuning.make,
     paper.make,
     origin.make,
 )
@@ -140,6 +142,8 @@ def _title(data: ReportData) -> str:
         return "Affetto learns to drum"
     if data.comparison or data.comparisons:
         return "A drumming skill, seen otherwise"
+    if data.results("tune") and not data.results("toy"):
+        return "Gains of the controllers, tuned on the whole robot"
     return "Transfer of a skill to inputs it has never seen"
 
 
@@ -149,6 +153,9 @@ def _story(data: ReportData) -> str:
     toy = data.results("toy")
     if toy and not parts:
         parts.append(wording.toy_gain(toy) + ".")
+    tuned = data.results("tune")
+    if tuned and not parts:
+        parts.append(wording.tuning_gain(tuned) + ".")
     if not parts:
         parts.append(
             "How schemes of learning and transfer fare under other conditions."

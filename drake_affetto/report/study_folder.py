@@ -13,7 +13,12 @@ from typing import Any
 
 from drake_affetto import __version__
 from drake_affetto.common.errors import InputError, require
+from drake_affetto.common.typed_json import from_plain
 from drake_affetto.experiments.results import STUDY_RESULTS, read_study
+from drake_affetto.tuning.results import TuningResults
+
+# The kinds of study that the page shows.
+STUDIES = (*STUDY_RESULTS, "tune")
 
 # What a study's folder can hold beside its numbers, and what kind it is of.
 MEDIA = {
@@ -33,7 +38,7 @@ class StudyFolder:
 
     Attributes:
         folder: The folder.
-        study: Kind of study, a key of `STUDY_RESULTS`.
+        study: Kind of study, one of `STUDIES`.
         results: Content of its results.json.
         media: Its pictures, sounds and replay, by file name.
     """
@@ -58,14 +63,15 @@ def read_folder(folder: Path) -> StudyFolder:
             f"{folder} has no results.json: not a study's folder, or its study "
             "is not finished"
         )
-    try:
-        results = json.loads(path.read_bytes(), parse_constant=_refuse)
-    except (ValueError, OSError, RecursionError) as error:
-        raise InputError(f"{path} is not readable JSON: {error}") from error
-    require(isinstance(results, dict), str(path), results, "an object")
+    results = read_json(path)
     study = _study_of(results, path)
     results["study"] = study
-    found = read_study(study, results, f"{path}: ")
+    where = f"{path}: "
+    if study == "tune":
+        found = from_plain(TuningResults, results, where)
+        found.check(where)
+    else:
+        found = read_study(study, results, where)
     version = found.version
     if version.split(".")[:2] != __version__.split(".")[:2]:
         raise InputError(
@@ -74,6 +80,20 @@ def read_folder(folder: Path) -> StudyFolder:
         )
     media = {name: folder / name for name in MEDIA if (folder / name).is_file()}
     return StudyFolder(folder, study, found, media)
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Reads an object from a JSON file.
+
+    Raises:
+        InputError: If it cannot be read or holds anything else.
+    """
+    try:
+        plain = json.loads(path.read_bytes(), parse_constant=_refuse)
+    except (ValueError, OSError, RecursionError) as error:
+        raise InputError(f"{path} is not readable JSON: {error}") from error
+    require(isinstance(plain, dict), str(path), plain, "an object")
+    return plain
 
 
 def _refuse(word: str) -> float:
@@ -91,10 +111,10 @@ def _study_of(results: dict[str, Any], path: Path) -> str:
             if keys <= results.keys():
                 return name
         raise InputError(f"{path} does not say of which study it is")
-    if not isinstance(study, str) or study not in STUDY_RESULTS:
+    if not isinstance(study, str) or study not in STUDIES:
         raise InputError(
             f"{path} is of the study {reprlib.repr(study)}, which has no place "
-            f"in the report: {', '.join(STUDY_RESULTS)} have"
+            f"in the report: {', '.join(STUDIES)} have"
         )
     return study
 

@@ -9,6 +9,7 @@ import dataclasses
 
 from drake_affetto.experiments.results import SuccessRate, ToyResults
 from drake_affetto.report.comparison import Comparison, SchemeComparison
+from drake_affetto.tuning.results import TuningResults
 
 # By scheme: what it is called, shortly and in full, and what it does.
 SCHEMES: dict[str, tuple[str, str, str]] = {
@@ -327,3 +328,21 @@ def toy_gain(toy: ToyResults) -> str:
         f"From five points, transfer brings the error on the turned square "
         f"from {turned:.3g} down to {ours:.2g}"
     )
+
+
+def tuning_gain(results: TuningResults) -> str:
+    """What tuning the gains gives, in one sentence."""
+    held_out = results.held_out_improvement.values()
+    return (
+        f"Tuning {number(len(results.joints), 'joint')} in "
+        f"{number(results.trials.finished, 'simulation')} changes the cost on "
+        f"the training trajectory from {results.hand_tuned.cost:.2f} to "
+        f"{results.best.cost:.2f}, and the cost on held-out trajectories by "
+        f"{signed_percent(-max(held_out))} to {signed_percent(-min(held_out))}"
+    )
+
+
+def signed_percent(share: float) -> str:
+    """As "+12 %", "−5 %", "0 %"."""
+    size = round(100.0 * share)
+    return f"{'+' if size > 0 else '−' if size < 0 else ''}{abs(size)} %"

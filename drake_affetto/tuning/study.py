@@ -19,20 +19,15 @@ from drake_affetto.common.errors import InputError
 from drake_affetto.common.fingerprint import text_digest
 from drake_affetto.common.folder_lock import lock_folder
 from drake_affetto.common.output import write_json, write_text_atomic
-from drake_affetto.common.typed_json import to_plain
 from drake_affetto.control.pidf import load_control
 from drake_affetto.pneumatics.parameters import load_parameters
 from drake_affetto.runner.workers import WorkerPool
 from drake_affetto.tuning.cma_es import JointwiseCmaEs
 from drake_affetto.tuning.environment import environment
+from drake_affetto.tuning.evaluation import evaluate, make_details, make_results
+from drake_affetto.tuning.gains_file import overlay_text, rounded_gains
 from drake_affetto.tuning.plan import TunePlan
-from drake_affetto.tuning.results import (
-    TuningResults,
-    evaluate,
-    make_results,
-    overlay_text,
-    rounded_gains,
-)
+from drake_affetto.tuning.results import DETAILS_FILE, TuningResults
 from drake_affetto.tuning.search import (
     STUDY_FILE,
     finished_trials,
@@ -87,7 +82,7 @@ def _prepare_study(
     if restart:
         for suffix in ("", "-wal", "-shm", "-journal"):
             Path(f"{path}{suffix}").unlink(missing_ok=True)
-        for old in ("results.json", "gains.yaml", "study.html"):
+        for old in ("results.json", "gains.yaml", "study.html", DETAILS_FILE):
             (out / old).unlink(missing_ok=True)
     mark = fingerprint(plan)
     try:
@@ -193,7 +188,6 @@ def run_tune(
     trials: int = 216,
     workers: int = 2,
     restart: bool = False,
-    page: bool = True,
     console: Any = None,
 ) -> TuningResults:
     """Runs the study in the folder `out` until it has `trials` trials.
@@ -204,7 +198,6 @@ def run_tune(
         trials: Number of finished trials, those of earlier runs included.
         workers: Number of worker processes; 0 for this one.
         restart: Whether to throw away what an earlier run has left.
-        page: Whether to write study.html too.
         console: A rich console for progress; None for silence.
 
     Returns:
@@ -236,18 +229,7 @@ def run_tune(
             out / "gains.yaml",
             overlay_text(plan, robot.names, gains, heading),
         )
-        if page:
-            from drake_affetto.tuning.page import write_page
-
-            if console is not None:
-                console.print("Writing the study's page ...")
-            write_page(
-                out / "study.html",
-                plan,
-                study,
-                to_plain(results),
-                evaluation,
-            )
+        write_json(out / DETAILS_FILE, make_details(plan, study, evaluation))
         # Last: where results.json is, all the rest is.
         write_json(out / "results.json", results)
     return results

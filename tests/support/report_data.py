@@ -382,6 +382,88 @@ def toy(seed=0, seeds=6):
     }
 
 
+def tune(seed=0):
+    joints = ("waist_yaw", "right_elbow_flexion")
+
+    def by_joint(value):
+        return {joint: value * (1 + i) for i, joint in enumerate(joints)}
+
+    def side(scale):
+        costs = {
+            "cost": 5.0 * scale,
+            "tracking_error_deg": by_joint(2.0 * scale),
+            "tracking_percent": by_joint(1.5 * scale),
+            "effort_percent": by_joint(9.0 * scale),
+            "oscillation_percent": by_joint(0.1 * scale),
+        }
+        gains = {"kP": 6e5, "kI": 2e5, "kD": 3e4, "kF": 5e-6}
+        return {
+            "cost": 5.0 * scale,
+            "gains": {
+                joint: {k: scale * v for k, v in gains.items()}
+                for joint in joints
+            },
+            "trajectories": dict.fromkeys(
+                ("sines_and_steps", "chirp", "strokes", "trapezoids"), costs
+            ),
+            "rest_oscillation_percent": by_joint(0.2 * scale),
+        }
+
+    return {
+        **head("tune", seed),
+        "scenario": "drumming",
+        "start": "hand_tuned.yaml",
+        "tuning": "tuning.yaml",
+        "joints": list(joints),
+        "trials": {
+            "finished": 24,
+            "complete": 21,
+            "pruned": 3,
+            "interrupted": 1,
+            "best": 17,
+        },
+        "hand_tuned": side(1.0),
+        "best": side(0.6),
+        "improvement": 0.4,
+        "held_out_improvement": {
+            "chirp": 0.3,
+            "strokes": -0.05,
+            "trapezoids": 0.25,
+        },
+    }
+
+
+def tune_details(seed=0):
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0.0, 4.0, 101)
+
+    def angles(error):
+        return {
+            joint: (10.0 * np.sin(t) + error * rng.normal(size=t.size)).tolist()
+            for joint in ("waist_yaw", "right_elbow_flexion")
+        }
+
+    return {
+        "trials": [
+            {"number": i, "pruned": i % 8 == 7, "cost": 5.0 - 0.1 * i}
+            for i in range(24)
+        ],
+        "importance": {
+            joint: {"kP": 0.5, "kI": 0.3, "kD": 0.15, "kF": 0.05}
+            for joint in ("waist_yaw", "right_elbow_flexion")
+        },
+        "references": {
+            name: {
+                "t": t.tolist(),
+                "desired": angles(0.0),
+                "hand_tuned": angles(2.0),
+                "tuned": angles(1.0),
+            }
+            for name in ("sines_and_steps", "chirp", "postures")
+        },
+    }
+
+
 def demo(seed=0):
     rng = np.random.default_rng([seed, 1])
 

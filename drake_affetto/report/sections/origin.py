@@ -13,6 +13,7 @@ _STUDIES = {
     "scenarios": "the schemes in all changed views",
     "conditions": "when transfer wins",
     "toy": "the paper's toy experiment",
+    "tune": "search for the controllers' gains",
 }
 
 
@@ -28,6 +29,8 @@ def make(data: ReportData) -> Section:
         ]
         if name == "scenarios":
             size.append(wording.number(len(results.scenarios), "view"))
+        if name == "tune":
+            size.append(wording.number(results.trials.finished, "trial"))
         rows.append(
             [
                 name,

@@ -1,12 +1,14 @@
 """The headline numbers."""
 
 import dataclasses
+from statistics import fmean
 
 from drake_affetto.report import wording
 from drake_affetto.report.comparison import SchemeComparison
 from drake_affetto.report.parts import Section
 from drake_affetto.report.report_data import ReportData
 from drake_affetto.report.wording import conclude
+from drake_affetto.tuning.config import TRAINING
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,6 +32,7 @@ def make(data: ReportData) -> Section:
         *_drumming_tiles(data),
         *_transfer_tiles(data),
         *_toy_tiles(data),
+        *_tuning_tiles(data),
     ] or _few_tiles(data)
     columns = {1: 1, 2: 2, 4: 4, 5: 5, 7: 4, 8: 4}.get(len(tiles), 3)
     return Section(
@@ -118,6 +121,24 @@ def _toy_tiles(data: ReportData) -> list[Tile]:
             "toy error after transfer from five points",
             f"{toy.source.rotated_mse:.3g} before; paper: "
             f"{toy.paper.transfer.other_mse_mean:g} after",
+        )
+    ]
+
+
+def _tuning_tiles(data: ReportData) -> list[Tile]:
+    results = data.results("tune")
+    if results is None:
+        return []
+    before, after = (
+        fmean(gains.trajectories[TRAINING].tracking_error_deg.values())
+        for gains in (results.hand_tuned, results.best)
+    )
+    return [
+        Tile(
+            f"{after:.2f}°",
+            "mean tracking error with tuned gains",
+            f"{before:.2f}° with the hand-tuned ones, on the training "
+            "trajectory",
         )
     ]
 

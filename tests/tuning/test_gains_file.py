@@ -3,8 +3,8 @@
 import yaml
 
 from drake_affetto.control.pidf import load_control
+from drake_affetto.tuning.gains_file import overlay_text
 from drake_affetto.tuning.plan import START_FILE, TunePlan
-from drake_affetto.tuning.results import overlay_text
 
 
 def test_both_arms_get_the_same_gains():
