@@ -13,7 +13,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         nargs="+",
         type=Path,
-        help="the folder of a study: demo, drum, mirror, toy, ...",
+        help="the folder of a study: demo, drum, mirror, toy, tune, ...",
     )
     parser.add_argument(
         "--out",

@@ -182,8 +182,8 @@ class WorkerPool:
             keep: Takes each result in this process, in the order in which
                 they finish.
             label: Name of this work in error messages.
-            on_death: Told of a worker's death before the calls are tried
-                again.
+            on_death: Function of a report, called after a worker's death
+                and before the calls are tried again.
             ahead: How many calls are handed over at a time.
 
         Raises:

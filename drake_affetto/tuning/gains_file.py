@@ -45,7 +45,7 @@ def overlay_text(
         pairs = ", ".join(f"{g}: {v}" for g, v in zip(GAINS, row, strict=True))
         lines.append(f"  {joint}: {{{pairs}}}")
     text = "\n".join(lines) + "\n"
-    # Guards the text that is put together by hand.
+    # The text is put together here, so it is read back.
     assert set(yaml.safe_load(text)["gains"]) == set(rows)
     return text
 

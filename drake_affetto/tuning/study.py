@@ -221,7 +221,7 @@ def run_tune(
         heading = (
             f"Gains from `affetto tune`: trial {best.number} of "
             f"{results.trials.finished}, seed {plan.seed}.\n"
-            f"Cost on the test trajectory {results.best.cost:.3f}; of "
+            f"Cost on the training trajectory {results.best.cost:.3f}; of "
             f"the hand-tuned gains {results.hand_tuned.cost:.3f}.\n"
             "A scenario takes them up with: control: {overlays: [THIS FILE]}"
         )

@@ -12,24 +12,9 @@ from drake_affetto.identification.problem import JointProblem
 from drake_affetto.identification.simulator import JointSimulator
 from drake_affetto.pneumatics.parameters import load_parameters
 from drake_affetto.robot.log import read_log
-from support.robot_bench import CONTROLLER, make_log, make_problem, true_values
+from support.robot_bench import CONTROLLER, make_log
 
 LOGS = Path(__file__).parents[2].parent / "shared/data/affetto-logs"
-
-
-@pytest.fixture(scope="module")
-def problem():
-    return make_problem()
-
-
-@pytest.fixture(scope="module")
-def truth(problem):
-    return true_values(problem)
-
-
-@pytest.fixture(scope="module")
-def log(problem, truth):
-    return make_log(problem, truth, seed=1)
 
 
 def test_a_fit_predicts_a_log_it_has_not_seen(problem, truth, log):

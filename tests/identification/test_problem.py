@@ -1,19 +1,10 @@
 """The parameters of a fit and their scales."""
 
-from pathlib import Path
-
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
 from support.robot_bench import make_problem
-
-LOGS = Path(__file__).parents[2].parent / "shared/data/affetto-logs"
-
-
-@pytest.fixture(scope="module")
-def problem():
-    return make_problem()
 
 
 @given(fraction=st.floats(0.0, 1.0), index=st.integers(0, 21))

@@ -1,29 +1,10 @@
 """Simulated logs, on synthetic robots whose parameters are known."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from drake_affetto.identification.simulator import JointSimulator
-from support.robot_bench import make_log, make_problem, true_values
-
-LOGS = Path(__file__).parents[2].parent / "shared/data/affetto-logs"
-
-
-@pytest.fixture(scope="module")
-def problem():
-    return make_problem()
-
-
-@pytest.fixture(scope="module")
-def truth(problem):
-    return true_values(problem)
-
-
-@pytest.fixture(scope="module")
-def log(problem, truth):
-    return make_log(problem, truth, seed=1)
+from support.robot_bench import make_log
 
 
 def test_a_robot_predicts_itself(problem, truth, log):

@@ -1,10 +1,8 @@
 """The uncertainty of a fit, on synthetic logs."""
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
-import pytest
 
 from drake_affetto.identification.fit import FitState
 from drake_affetto.identification.simulator import JointSimulator
@@ -12,24 +10,6 @@ from drake_affetto.identification.uncertainty import (
     estimate_uncertainty,
     profile_fit,
 )
-from support.robot_bench import make_log, make_problem, true_values
-
-LOGS = Path(__file__).parents[2].parent / "shared/data/affetto-logs"
-
-
-@pytest.fixture(scope="module")
-def problem():
-    return make_problem()
-
-
-@pytest.fixture(scope="module")
-def truth(problem):
-    return true_values(problem)
-
-
-@pytest.fixture(scope="module")
-def log(problem, truth):
-    return make_log(problem, truth, seed=1)
 
 
 def test_uncertainty_knows_what_a_log_does_not_show(problem, truth, log):

@@ -1,7 +1,5 @@
 """The robot's own controller."""
 
-from pathlib import Path
-
 import pytest
 
 from drake_affetto.common.errors import InputError
@@ -9,8 +7,6 @@ from drake_affetto.robot.controller import require_joint
 from support.robot_bench import (
     CONTROLLER,
 )
-
-LOGS = Path(__file__).parents[2].parent / "shared/data/affetto-logs"
 
 
 def test_joints_that_are_not_there_are_named():

@@ -18,7 +18,7 @@ def search(joints=3, parameters=4, *, population=9, seed=5):
 
 
 def bowl(x, goal, scale):
-    """Each joint's own quadratic, with a little of its neighbours'."""
+    """Each joint's own quadratic, with a little of its neighbors'."""
     own = np.sum(scale * (x - goal) ** 2, axis=1)
     return own + 0.05 * np.mean(own)
 
