@@ -2,7 +2,10 @@
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from drake_affetto.common.typing import Array
 
 
 class InputError(ValueError):
@@ -25,7 +28,9 @@ def require_range(
     high: float = math.inf,
 ) -> None:
     """Raises InputError unless `value` is a number in [low, high]."""
-    if math.isinf(low):
+    if math.isinf(low) and math.isinf(high):
+        expected = "a finite number"
+    elif math.isinf(low):
         expected = f"a number of at most {high:g}"
     elif math.isinf(high):
         expected = f"a number of at least {low:g}"
@@ -33,6 +38,68 @@ def require_range(
         expected = f"a number from {low:g} to {high:g}"
     fits = isinstance(value, (int, float)) and low <= value <= high
     require(fits and math.isfinite(value), field, value, expected)
+
+
+def require_array(
+    field: str,
+    value: Any,
+    shape: tuple[int | None, ...] | None = None,
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+    positive: bool = False,
+    expected: str = "",
+) -> "Array":
+    """Returns `value` as an array of finite numbers in [low, high].
+
+    Args:
+        field: Name of the array in errors.
+        value: What is converted to an array of floats.
+        shape: Expected shape; None where any length fits, or for any shape.
+        low: Least value of an entry.
+        high: Greatest value of an entry.
+        positive: Whether entries must be above 0.
+        expected: What the array should be, in words, for a wrong shape.
+
+    Raises:
+        InputError: If it is no array of numbers, has another shape, or an
+            entry does not fit: the message names the first such entry by its
+            index and value.
+    """
+    import numpy as np
+
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{field} is no array of numbers") from error
+    fits = shape is None or (
+        array.ndim == len(shape)
+        and all(
+            want is None or want == size
+            for want, size in zip(shape, array.shape, strict=True)
+        )
+    )
+    if not fits:
+        assert shape is not None
+        sizes = ", ".join("any" if n is None else str(n) for n in shape)
+        sizes += "," if len(shape) == 1 else ""
+        raise InputError(
+            f"{field} is an array of shape {array.shape}, expected "
+            f"{expected or 'the shape'} ({sizes})"
+        )
+    good = np.isfinite(array) & (array >= low) & (array <= high)
+    if positive:
+        good &= array > 0.0
+    if not good.all():
+        index = tuple(int(i) for i in np.argwhere(~good)[0])
+        place = field
+        if index:
+            place += f"[{', '.join(map(str, index))}]"
+        entry = float(array[index])
+        if positive:
+            require(False, place, entry, "a number above 0")
+        require_range(place, entry, low, high)
+    return array
 
 
 def require_file(field: str, path: str | Path) -> Path:

@@ -18,7 +18,12 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drake_affetto.common.errors import InputError, require, require_range
+from drake_affetto.common.errors import (
+    InputError,
+    require,
+    require_array,
+    require_range,
+)
 
 DEFAULT_FILE = "package://drake_affetto/control.yaml"
 
@@ -64,15 +69,10 @@ class PidfGains:
             "an array of one gain for each joint",
         )
         for field in ("kP", "kI", "kD", "kF"):
-            value = np.array(getattr(self, field), dtype=float)
-            require(
-                value.shape == self.kP.shape
-                and bool(np.all(np.isfinite(value) & (value >= 0.0))),
-                field,
-                value,
-                f"{self.kP.size} gains of at least 0",
+            value = require_array(
+                field, getattr(self, field), self.kP.shape, low=0.0
             )
-            setattr(self, field, value)
+            setattr(self, field, value.copy())
 
     @classmethod
     def from_array(cls, array: ArrayLike) -> Self:

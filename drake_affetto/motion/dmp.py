@@ -35,7 +35,12 @@ from scipy.interpolate import BSpline
 from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import lfilter
 
-from drake_affetto.common.errors import InputError, require, require_range
+from drake_affetto.common.errors import (
+    InputError,
+    require,
+    require_array,
+    require_range,
+)
 from drake_affetto.common.typing import Array
 
 # Gauss-Legendre nodes and weights for the forcing term within one step, on
@@ -749,4 +754,4 @@ def _pair(t: Any, q: Any) -> list[tuple[Array, Array]]:
 def _require_finite(field: str, value: Array) -> None:
     # The sum of finite numbers of a sane size is finite, and is one call.
     if not math.isfinite(value.sum()):
-        require(bool(np.isfinite(value).all()), field, value, "finite numbers")
+        require_array(field, value)

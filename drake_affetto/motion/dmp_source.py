@@ -14,7 +14,7 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
-from drake_affetto.common.errors import require, require_range
+from drake_affetto.common.errors import require, require_array, require_range
 from drake_affetto.motion.dmp import Dmp
 
 
@@ -162,20 +162,7 @@ class DmpSource(LeafSystem):
         return float(parameter.value()[0])
 
     def _checked_posture(self, q: ArrayLike) -> np.ndarray:
-        posture = np.asarray(q, dtype=float)
-        require(
-            posture.shape == (self._n,),
-            "start_posture.shape",
-            posture.shape,
-            f"({self._n},)",
-        )
-        require(
-            bool(np.isfinite(posture).all()),
-            "start_posture",
-            posture,
-            "finite numbers",
-        )
-        return posture
+        return require_array("start_posture", q, (self._n,))
 
     def _update(self, context: Context, values: DiscreteValues) -> None:
         dmp = self._dmp

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from drake_affetto.common.errors import InputError, require, require_range
-from drake_affetto.common.typing import Image
+from drake_affetto.common.typing import Array, Image
 
 
 @dataclasses.dataclass
@@ -49,17 +49,17 @@ class BlobCalibration:
                 f"at least one pixel more than {name}_min ({low:g})",
             )
 
-    def to_vector(self) -> Image:
+    def to_vector(self) -> Array:
         """(u_min, u_max, v_min, v_max) as an array (4,)."""
         return np.array([self.u_min, self.u_max, self.v_min, self.v_max])
 
-    def normalize(self, uv: Image) -> Image:
+    def normalize(self, uv: Array) -> Array:
         """(x_img, y_img) (..., 2) of pixels (..., 2); beyond [0, 1] outside."""
         low = np.array([self.u_min, self.v_min])
         high = np.array([self.u_max, self.v_max])
         return (np.asarray(uv) - low) / (high - low)
 
-    def pixels(self, xy: Image) -> Image:
+    def pixels(self, xy: Array) -> Array:
         """Pixel coordinates (..., 2) of (x_img, y_img) (..., 2)."""
         low = np.array([self.u_min, self.v_min])
         high = np.array([self.u_max, self.v_max])
@@ -67,7 +67,7 @@ class BlobCalibration:
 
 
 def calibrate(
-    uv: Image,
+    uv: Array,
     margin: float = 0.05,
     image_width: int | None = None,
 ) -> BlobCalibration:
@@ -469,7 +469,7 @@ def _complete(
     )
 
 
-def _distance(offset: Image, shape: Image) -> Image:
+def _distance(offset: Array, shape: Array) -> Array:
     """Signed distance (n,) [pixels], about, of points (n, 2) off an ellipse.
 
     The ellipse is xᵀ·shape·x = 1 about the origin.
@@ -480,13 +480,13 @@ def _distance(offset: Image, shape: Image) -> Image:
     return np.linalg.norm(offset, axis=1) * (1.0 - 1.0 / r)
 
 
-def _off_rim(offset: Image, shape: Image) -> float:
+def _off_rim(offset: Array, shape: Array) -> float:
     """How far the rim is off the ellipse, at most of its pixels [pixels]."""
     distance = _distance(offset, shape)
     return float(np.quantile(np.abs(distance - np.median(distance)), 0.95))
 
 
-def _fit_ellipse(points: Image) -> tuple[Image, Image] | None:
+def _fit_ellipse(points: Array) -> tuple[Array, Array] | None:
     """Center (2,) and shape (2, 2) of the ellipse nearest to points (n, 2)."""
     if len(points) < 6:
         return None

@@ -9,7 +9,7 @@ import math
 import cv2
 import numpy as np
 
-from drake_affetto.common.typing import Image
+from drake_affetto.common.typing import Array, Image
 
 # The encoding that display images have, for gains that act on light.
 _GAMMA = 2.2
@@ -38,7 +38,7 @@ class ImageEffects:
         default_factory=lambda: [0.0, 0.0]
     )
 
-    def to_vector(self) -> Image:
+    def to_vector(self) -> Array:
         """The seven numbers (7,) that a context keeps as a parameter."""
         return np.array(
             [
@@ -51,7 +51,7 @@ class ImageEffects:
         )
 
     @classmethod
-    def from_vector(cls, vector: Image) -> "ImageEffects":
+    def from_vector(cls, vector: Array) -> "ImageEffects":
         """The inverse of `to_vector`."""
         v = [float(number) for number in vector]
         return cls(v[0], v[1:4], v[4], v[5:7])

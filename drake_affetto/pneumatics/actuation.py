@@ -16,7 +16,7 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
-from drake_affetto.common.errors import require, require_range
+from drake_affetto.common.errors import require, require_array, require_range
 from drake_affetto.pneumatics.chamber import (
     FLOW_MODE,
     REGULATOR_MODE,
@@ -291,14 +291,9 @@ class PneumaticActuation(LeafSystem):
             (pressure[n:], "p_b", p_b),
         ):
             given = np.asarray(value, dtype=float)
-            require(
-                given.shape in ((), (1,), (n,))
-                and bool(np.all((given > 0.0) & np.isfinite(given))),
-                name,
-                value,
-                f"{n} absolute pressures above 0 Pa",
-            )
-            part[:] = given
+            if given.shape in ((), (1,)):
+                given = np.full(n, given)
+            part[:] = require_array(name, given, (n,), positive=True)
         torque = _chamber_torque(self.get_parameters(context), pressure)
         context.SetDiscreteState(self._pressure_index, pressure)
         context.SetDiscreteState(self._torque_index, torque)

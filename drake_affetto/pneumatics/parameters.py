@@ -8,7 +8,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drake_affetto.common.errors import InputError, require, require_range
+from drake_affetto.common.errors import (
+    InputError,
+    require,
+    require_array,
+    require_range,
+)
 from drake_affetto.pneumatics.chamber import (
     ROWS,
     Row,
@@ -215,16 +220,15 @@ class PneumaticParameters:
             InputError: for an unknown joint or limits that do not fit.
         """
         n = len(names)
-        low = np.asarray(q_lower, dtype=float)
-        high = np.asarray(q_upper, dtype=float)
-        require(low.shape == (n,), "q_lower", low, f"{n} angles")
-        require(high.shape == (n,), "q_upper", high, f"{n} angles")
-        require(
-            bool(np.all(np.isfinite(low) & np.isfinite(high) & (low < high))),
-            "q_lower, q_upper",
-            (low, high),
-            "finite limits, each lower one below its upper one",
-        )
+        low = require_array("q_lower", q_lower, (n,))
+        high = require_array("q_upper", q_upper, (n,))
+        for i in range(n):
+            require(
+                low[i] < high[i],
+                f"q_lower[{i}]",
+                float(low[i]),
+                f"a number below q_upper[{i}], which is {high[i]:g}",
+            )
         array = np.empty((ROWS, n))
         for i, name in enumerate(names):
             actuator = self.actuator_of(name)

@@ -35,7 +35,12 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
-from drake_affetto.common.errors import InputError, require, require_range
+from drake_affetto.common.errors import (
+    InputError,
+    require,
+    require_array,
+    require_range,
+)
 from drake_affetto.common.resources import configure_parser, resolve
 from drake_affetto.geometry.kinematics import SerialChain
 
@@ -477,13 +482,7 @@ def set_drum_position(
     Raises:
         InputError: if the drum would not stand wholly on the table.
     """
-    place = np.asarray(xy, dtype=float)
-    require(
-        place.shape == (2,) and bool(np.all(np.isfinite(place))),
-        "drum position",
-        place.tolist(),
-        "two finite numbers (x and y in meters)",
-    )
+    place = require_array("drum position", xy, (2,))
     low, high = drum_limits(plant, context)
     require(
         bool(np.all(place >= low) and np.all(place <= high)),

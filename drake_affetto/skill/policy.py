@@ -17,7 +17,12 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
-from drake_affetto.common.errors import InputError, require, require_range
+from drake_affetto.common.errors import (
+    InputError,
+    require,
+    require_array,
+    require_range,
+)
 
 
 class Regressor(Protocol):
@@ -207,20 +212,7 @@ class SkillPolicy(LeafSystem):
         )
 
     def _checked_theta(self, field: str, theta: ArrayLike) -> np.ndarray:
-        parameters = np.asarray(theta, dtype=float)
-        require(
-            parameters.shape == (self._size,),
-            f"{field}.shape",
-            parameters.shape,
-            f"({self._size},)",
-        )
-        require(
-            bool(np.isfinite(parameters).all()),
-            field,
-            parameters,
-            "finite numbers",
-        )
-        return parameters
+        return require_array(field, theta, (self._size,))
 
     def _update(self, context: Context, values: DiscreteValues) -> None:
         if context.get_discrete_state(self._latched_index).value()[0] > 0.5:
@@ -237,12 +229,7 @@ class SkillPolicy(LeafSystem):
                 "set_policy_parameters first"
             )
         tau: Any = self._task_input.Eval(context)
-        require(
-            bool(np.isfinite(tau).all()),
-            "task_parameter",
-            tau.tolist(),
-            "finite numbers once settled is 1",
-        )
+        require_array("task_parameter", tau)
         theta = np.asarray(regressor.predict(tau[None, :]))
         theta = self._checked_theta("predicted theta", theta.reshape(-1))
         start_time = context.get_time() + self._delay

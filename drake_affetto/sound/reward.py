@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import fft, ndimage, signal
 
-from drake_affetto.common.errors import require, require_range
+from drake_affetto.common.errors import require, require_array, require_range
 from drake_affetto.common.typing import Array
 from drake_affetto.sound import impact
 from drake_affetto.sound.voice import DrumVoice
@@ -117,12 +117,7 @@ def spectrogram(
         f"an array of shape {sound.shape}",
         f"at least {size} samples, one window",
     )
-    require(
-        bool(np.isfinite(sound).all()),
-        "pressure",
-        "not finite",
-        "finite numbers",
-    )
+    require_array("pressure", sound)
     require_range("reward.high", config.high, high=0.5 * rate)
     # Nothing above the highest band matters: most samples can go first.
     spare = max(1, int(rate / (2.5 * config.high)))
@@ -347,14 +342,8 @@ def tap_prototypes(
 
 
 def _spectrogram_array(field: str, values: ArrayLike) -> Array:
-    array = np.asarray(values, dtype=float)
-    require(
-        array.ndim == 2 and array.size > 0,
-        field,
-        f"an array of shape {array.shape}",
-        "a spectrogram (bands, frames)",
+    array = require_array(
+        field, values, (None, None), expected="a spectrogram (bands, frames)"
     )
-    require(
-        bool(np.isfinite(array).all()), field, "not finite", "finite numbers"
-    )
+    require(array.size > 0, field, array.shape, "bands and frames")
     return array

@@ -31,7 +31,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import linalg, signal, special
 from scipy.io import wavfile
 
-from drake_affetto.common.errors import InputError, require, require_range
+from drake_affetto.common.errors import (
+    InputError,
+    require,
+    require_array,
+    require_range,
+)
 from drake_affetto.common.typing import Array
 
 _AIR_DENSITY = 1.2  # kg/m^3
@@ -655,12 +660,7 @@ class DrumVoice:
             flow.shape,
             f"an array of {rows} rows",
         )
-        require(
-            bool(np.isfinite(flow).all()),
-            "mass_flow",
-            "not finite",
-            "finite numbers",
-        )
+        require_array("mass_flow", flow)
         if flow.ndim == 2:
             flow = np.sqrt(np.sum(flow**2, axis=1))
         level = np.interp(
@@ -677,17 +677,9 @@ def _vector(
 ) -> Array:
     if values is None:
         return np.zeros(rows or 0)
-    array = np.ascontiguousarray(values, dtype=float)
-    require(
-        array.ndim == 1 and (rows is None or len(array) == rows),
-        field,
-        f"an array of shape {array.shape}",
-        "one number a sample" if rows is None else f"{rows} numbers",
+    return np.ascontiguousarray(
+        require_array(field, values, (rows,), expected="one number a sample")
     )
-    require(
-        bool(np.isfinite(array).all()), field, "not finite", "finite numbers"
-    )
-    return array
 
 
 def _held_radius(

@@ -29,7 +29,12 @@ import numpy as np
 
 import drake_affetto
 from drake_affetto.common.csv_columns import read_columns
-from drake_affetto.common.errors import InputError, require, require_file
+from drake_affetto.common.errors import (
+    InputError,
+    require,
+    require_array,
+    require_file,
+)
 from drake_affetto.common.output import atomic_path
 from drake_affetto.common.typing import Array
 
@@ -154,23 +159,8 @@ class Demonstration:
         value = getattr(self, field)
         if value is None and field not in ("t", "q"):
             return
-        try:
-            array = np.array(value, dtype=float)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"{field} is no array of numbers") from error
-        require(
-            array.ndim == dimensions,
-            field,
-            f"an array of shape {array.shape}",
-            f"{dimensions} dimension(s)",
-        )
-        require(
-            bool(np.isfinite(array).all()),
-            field,
-            "not finite",
-            "finite numbers",
-        )
-        setattr(self, field, array)
+        shape = (None,) * dimensions
+        setattr(self, field, require_array(field, value, shape).copy())
 
 
 def append_demonstration(path: str | Path, demonstration: Demonstration) -> int:

@@ -7,6 +7,7 @@ import pytest
 from drake_affetto.common.errors import (
     InputError,
     require,
+    require_array,
     require_file,
     require_range,
 )
@@ -62,3 +63,46 @@ def test_require_file(tmp_path):
     for wrong in (tmp_path / "none", tmp_path):
         with pytest.raises(InputError, match=r"scenario is .*existing file"):
             require_file("scenario", wrong)
+
+
+def test_require_array_gives_floats():
+    array = require_array("x", [1, 2], (2,))
+    assert array.dtype == float
+    assert require_array("x", [[1.0, 2.0]], (None, 2)).shape == (1, 2)
+    assert require_array("x", 3).shape == ()
+
+
+@pytest.mark.parametrize(
+    ("value", "options", "message"),
+    [
+        ([0.0, math.nan, math.inf], {}, r"x\[1\] is nan, expected a finite"),
+        (
+            [[1.0, 2.0], [3.0, -4.0]],
+            {"low": 0},
+            r"x\[1, 1\] is -4.0, .*least 0",
+        ),
+        ([1.0, 9.0], {"low": 0, "high": 5}, r"x\[1\] is 9.0, .*from 0 to 5"),
+        ([1.0, 0.0], {"positive": True}, r"x\[1\] is 0.0, .*above 0"),
+        (math.nan, {}, "x is nan, expected a finite number"),
+        ([1.0], {"shape": (2,)}, r"of shape \(1,\), expected the shape \(2,\)"),
+        (
+            [1.0],
+            {"shape": (None, 3), "expected": "points"},
+            r"expected points \(any, 3\)",
+        ),
+        (["a"], {}, "x is no array of numbers"),
+        ([[1.0], [1.0, 2.0]], {}, "x is no array of numbers"),
+    ],
+)
+def test_require_array_names_the_first_wrong_entry(value, options, message):
+    with pytest.raises(InputError, match=message) as caught:
+        require_array("x", value, **options)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_large_array_is_not_printed():
+    theta = [0.0] * 120
+    theta[17] = math.nan
+    with pytest.raises(InputError) as caught:
+        require_array("theta", theta, (120,))
+    assert str(caught.value) == "theta[17] is nan, expected a finite number"

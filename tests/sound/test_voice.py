@@ -508,7 +508,7 @@ GOOD = {
         ("t", [0.0], "t is"),
         ("t", [0.0, 1.0, 2.0, 2.0, 5.0], "t is"),
         ("t", np.arange(5)[::-1] * 1e-3, "t is"),
-        ("t", [0.0, 1.0, np.nan, 3.0, 4.0], "t is"),
+        ("t", [0.0, 1.0, np.nan, 3.0, 4.0], r"t\[2\] is nan"),
         ("head_force", np.zeros(4), "head_force"),
         ("head_radius", np.zeros((5, 2)), "head_radius"),
         ("shell_force", np.full(5, np.nan), "shell_force"),
