@@ -101,6 +101,9 @@ def place(module: str) -> str:
 def test_imports_run_one_way(path):
     own = place(module_name(path))
     assert own in RANK, f"{path.name} needs a place in ORDER"
+    if path == PACKAGE / "__init__.py":
+        # The package's own face names what it imports when it is used.
+        return
     for module in imports(ast.parse(path.read_text()), top_only=False):
         if module.split(".")[0] != "drake_affetto":
             assert module != "pydrake.all", "name what is needed"

@@ -97,6 +97,7 @@ def test_wheel_holds_the_package_and_every_model(wheel):
     }
     assert expected - held == set()
     assert "drake_affetto/models/package.xml" in held
+    assert "drake_affetto/py.typed" in held
     assert "drake_affetto/report/templates/page.html.j2" in held
 
 

@@ -21,8 +21,7 @@ def attach(
 
     Args:
         package: `__name__` of the package.
-        exports: Module inside the package, by public name. A module further
-            away has its full dotted name.
+        exports: Module inside the package, by public name.
 
     Returns:
         `__getattr__`, `__dir__` and `__all__` of the package.
@@ -33,9 +32,8 @@ def attach(
             raise AttributeError(
                 f"module {package!r} has no attribute {name!r}"
             )
-        module = exports[name]
-        full = module if "." in module else f"{package}.{module}"
-        value = getattr(importlib.import_module(full), name)
+        module = importlib.import_module(f"{package}.{exports[name]}")
+        value = getattr(module, name)
         # The next use finds it at once.
         setattr(sys.modules[package], name, value)
         return value

@@ -1,1 +1,37 @@
 """The paper's experiments on the station, one module each."""
+
+from typing import TYPE_CHECKING
+
+from drake_affetto.common.lazy import attach
+
+if TYPE_CHECKING:
+    from drake_affetto.experiments.demo import run_demo
+    from drake_affetto.experiments.drumming import run_drum
+    from drake_affetto.experiments.episode import TrialRunner
+    from drake_affetto.experiments.mirror import run_mirror
+    from drake_affetto.experiments.plans import (
+        DemoPlan,
+        DrumPlan,
+        MirrorPlan,
+        TeachPlan,
+        ToyPlan,
+    )
+    from drake_affetto.experiments.teaching import teach
+    from drake_affetto.experiments.toy import run_toy
+
+__getattr__, __dir__, __all__ = attach(
+    __name__,
+    {
+        "DemoPlan": "plans",
+        "DrumPlan": "plans",
+        "MirrorPlan": "plans",
+        "TeachPlan": "plans",
+        "ToyPlan": "plans",
+        "TrialRunner": "episode",
+        "run_demo": "demo",
+        "run_drum": "drumming",
+        "run_mirror": "mirror",
+        "run_toy": "toy",
+        "teach": "teaching",
+    },
+)

@@ -1,5 +1,19 @@
 """Dynamic Movement Primitives."""
 
-from drake_affetto.motion.dmp import Dmp, DmpConfig, Rollout
+from typing import TYPE_CHECKING
 
-__all__ = ["Dmp", "DmpConfig", "Rollout"]
+from drake_affetto.common.lazy import attach
+
+if TYPE_CHECKING:
+    from drake_affetto.motion.dmp import Dmp, DmpConfig, Rollout
+    from drake_affetto.motion.dmp_source import DmpSource
+
+__getattr__, __dir__, __all__ = attach(
+    __name__,
+    {
+        "Dmp": "dmp",
+        "DmpConfig": "dmp",
+        "DmpSource": "dmp_source",
+        "Rollout": "dmp",
+    },
+)

@@ -1,19 +1,37 @@
-"""Valves, chambers and joint friction of the pneumatic actuators.
+"""Valves, chambers and joint friction of the pneumatic actuators."""
 
-The system is in `actuation`, its continuous twin in `continuous`; what is
-re-exported here needs no Drake.
-"""
+from typing import TYPE_CHECKING
 
-from drake_affetto.pneumatics.flow import mass_flow_rate
-from drake_affetto.pneumatics.parameters import (
-    ActuatorClass,
-    PneumaticParameters,
-    load_parameters,
+from drake_affetto.common.lazy import attach
+
+if TYPE_CHECKING:
+    from drake_affetto.pneumatics.actuation import (
+        PneumaticActuation,
+        PneumaticActuationConfig,
+    )
+    from drake_affetto.pneumatics.continuous import (
+        ContinuousPneumaticActuation,
+        ContinuousPneumaticActuation_,
+    )
+    from drake_affetto.pneumatics.flow import mass_flow_rate
+    from drake_affetto.pneumatics.parameters import (
+        ActuatorClass,
+        JointActuator,
+        PneumaticParameters,
+        load_parameters,
+    )
+
+__getattr__, __dir__, __all__ = attach(
+    __name__,
+    {
+        "ActuatorClass": "parameters",
+        "ContinuousPneumaticActuation": "continuous",
+        "ContinuousPneumaticActuation_": "continuous",
+        "JointActuator": "parameters",
+        "PneumaticActuation": "actuation",
+        "PneumaticActuationConfig": "actuation",
+        "PneumaticParameters": "parameters",
+        "load_parameters": "parameters",
+        "mass_flow_rate": "flow",
+    },
 )
-
-__all__ = [
-    "ActuatorClass",
-    "PneumaticParameters",
-    "load_parameters",
-    "mass_flow_rate",
-]

@@ -1,26 +1,36 @@
-"""The drum's voice, and how a recording becomes a reward."""
+"""The drum's sound by modal synthesis, and the reward of a recording."""
 
-from drake_affetto.sound.config import SoundConfig, load_sound_config
-from drake_affetto.sound.reward import (
-    RewardConfig,
-    cut_prototype,
-    reward,
-    similarity,
-    spectrogram,
-    tap_prototypes,
+from typing import TYPE_CHECKING
+
+from drake_affetto.common.lazy import attach
+
+if TYPE_CHECKING:
+    from drake_affetto.sound.config import SoundConfig, load_sound_config
+    from drake_affetto.sound.microphone import DrumMicrophone
+    from drake_affetto.sound.reward import (
+        RewardConfig,
+        cut_prototype,
+        reward_over_time,
+        similarity,
+        spectrogram,
+        tap_prototypes,
+    )
+    from drake_affetto.sound.voice import DrumVoice, VoiceConfig, write_wav
+
+__getattr__, __dir__, __all__ = attach(
+    __name__,
+    {
+        "DrumMicrophone": "microphone",
+        "DrumVoice": "voice",
+        "RewardConfig": "reward",
+        "SoundConfig": "config",
+        "VoiceConfig": "voice",
+        "cut_prototype": "reward",
+        "load_sound_config": "config",
+        "reward_over_time": "reward",
+        "similarity": "reward",
+        "spectrogram": "reward",
+        "tap_prototypes": "reward",
+        "write_wav": "voice",
+    },
 )
-from drake_affetto.sound.voice import DrumVoice, VoiceConfig, write_wav
-
-__all__ = [
-    "DrumVoice",
-    "RewardConfig",
-    "SoundConfig",
-    "VoiceConfig",
-    "cut_prototype",
-    "load_sound_config",
-    "reward",
-    "similarity",
-    "spectrogram",
-    "tap_prototypes",
-    "write_wav",
-]

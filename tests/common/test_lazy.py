@@ -16,12 +16,14 @@ def package(tmp_path, monkeypatch):
             from drake_affetto.common.lazy import attach
 
             __getattr__, __dir__, __all__ = attach(
-                __name__, {"LIGHT": "light", "join": "os.path"}
+                __name__, {"LIGHT": "light", "half": "inner.maths"}
             )
             """
         )
     )
     (folder / "light.py").write_text("LIGHT = object()\n")
+    (folder / "inner").mkdir()
+    (folder / "inner" / "maths.py").write_text("def half(x): return x / 2\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     yield __import__("lazy_sample")
     for name in list(sys.modules):
@@ -34,12 +36,12 @@ def test_a_name_is_imported_when_it_is_used(package):
     first = package.LIGHT
     assert "lazy_sample.light" in sys.modules
     assert package.LIGHT is first
-    assert package.join("a", "b") == "a/b"
+    assert package.half(3) == 1.5
 
 
 def test_the_names_are_listed(package):
-    assert package.__all__ == ["LIGHT", "join"]
-    assert dir(package) == ["LIGHT", "join"]
+    assert package.__all__ == ["LIGHT", "half"]
+    assert dir(package) == ["LIGHT", "half"]
 
 
 def test_other_names_are_refused(package):
