@@ -22,7 +22,7 @@ from drake_affetto.experiments.episode import (
 )
 from drake_affetto.scene.view import set_default_camera_pose
 from drake_affetto.skill.policy import Regressor
-from drake_affetto.sound.voice import write_wav
+from drake_affetto.sound.wav import write_wav
 from drake_affetto.station.scenario import Scenario
 
 _FRAMES_PER_SECOND = 32.0

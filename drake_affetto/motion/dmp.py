@@ -25,90 +25,33 @@ else: with s = T / T_0 the equation reads s² q̈ = k_S (g - q) - s k_D q̇ + f.
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-import dataclasses
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import BSpline
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_solve
 from scipy.signal import lfilter
 
 from drake_affetto.common.errors import (
-    InputError,
     require,
     require_array,
     require_range,
 )
 from drake_affetto.common.typing import Array
-
-# Gauss-Legendre nodes and weights for the forcing term within one step, on
-# [0, 1]. Four of them leave an error below 1e-12 rad for steps up to a quarter
-# of the standard deviation of a basis function.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
-_NODES = (_NODES + 1.0) / 2.0
-_WEIGHTS = _WEIGHTS / 2.0
+from drake_affetto.motion.dmp_config import DmpConfig
+from drake_affetto.motion.encoding import (
+    NODES,
+    WEIGHTS,
+    Design,
+    factorize,
+    pair_demonstrations,
+    smoothing_operator,
+)
+from drake_affetto.motion.spring import spring_transition
 
 # How many time grids a Dmp remembers the responses of.
 _REMEMBERED_GRIDS = 16
-
-
-@dataclasses.dataclass
-class DmpConfig:
-    """The constants of a Dmp.
-
-    Attributes:
-        n_basis: K, how many basis functions each joint has.
-        duration: s, T_0, in which the phase falls from 1 to 0.
-        stiffness: 1/s², k_S.
-        damping: 1/s, k_D; None for critical damping, 2 √k_S.
-        width: the standard deviation of a basis function in units of the
-            distance between neighbors, so V = (K - 1)² / (2 width²).
-        method: how `encode` finds θ. "trajectory": the rollout comes closest
-            to the demonstrated positions. "forcing": the forcing term comes
-            closest to the one that the smoothed demonstration would need.
-        ridge: weight of ‖θ‖² beside the mean squared error, the error being
-            expressed as a forcing term.
-        smoothing: s, time scale below which a demonstration is smoothed
-            before it is differentiated ("forcing" only). It also blurs a
-            movement that sets out abruptly; "trajectory" does not.
-
-    The defaults were chosen on 3 s windows of a real demonstration (30 Hz), by
-    the error on samples that were left out; within 25 to 400 1/s² of stiffness
-    and widths of 0.5 to 1 they hardly matter.
-    """
-
-    n_basis: int = 15
-    duration: float = 3.0
-    stiffness: float = 100.0
-    damping: float | None = None
-    width: float = 0.7
-    method: str = "trajectory"
-    ridge: float = 1e-6
-    smoothing: float = 0.05
-
-    def check(self, where: str) -> None:
-        """Raises InputError naming the first field that does not fit."""
-        require(
-            isinstance(self.n_basis, int) and 2 <= self.n_basis <= 1000,
-            f"{where}.n_basis",
-            self.n_basis,
-            "a whole number from 2 to 1000",
-        )
-        require_range(f"{where}.duration", self.duration, 1e-3, 1e6)
-        require_range(f"{where}.stiffness", self.stiffness, 1e-6, 1e8)
-        if self.damping is not None:
-            require_range(f"{where}.damping", self.damping, 1e-6, 1e6)
-        require_range(f"{where}.width", self.width, 0.2, 5.0)
-        require(
-            self.method in ("trajectory", "forcing"),
-            f"{where}.method",
-            self.method,
-            "'trajectory' or 'forcing'",
-        )
-        require_range(f"{where}.ridge", self.ridge, 0.0, 1e6)
-        require_range(f"{where}.smoothing", self.smoothing, 1e-6, 10.0)
 
 
 class Rollout(NamedTuple):
@@ -406,7 +349,7 @@ class Dmp:
             InputError: if there are too few samples, sizes do not agree, time
                 does not increase or a value is not finite.
         """
-        demonstrations = _pair(t, q)
+        demonstrations = pair_demonstrations(t, q)
         gram = np.zeros((self.n_basis, self.n_basis))
         moment: Any = 0.0
         samples = 0
@@ -433,7 +376,7 @@ class Dmp:
             factor = design.factor
         if len(demonstrations) > 1:
             gram[np.diag_indices_from(gram)] += samples * self._config.ridge
-            factor = _factor(gram)
+            factor = factorize(gram)
         weights = cho_solve(factor, moment, check_finite=False)
         return np.ascontiguousarray(weights.T).reshape(-1)
 
@@ -489,7 +432,7 @@ class Dmp:
             an initial offset of 1 rad and one for an initial 1 rad/s.
         """
         stiffness, damping, _ = self._rates(duration)
-        transition = _transition(t, stiffness, damping)
+        transition = spring_transition(t, stiffness, damping)
         acceleration = (
             -stiffness * transition[:, 0] - damping * transition[:, 1]
         )
@@ -522,12 +465,12 @@ class Dmp:
         fastest = 0.5 * damping + math.sqrt(abs(0.25 * damping**2 - stiffness))
         rate = max(4.0 / (self._deviation * duration), 2.0 * fastest)
         parts = math.ceil(dt * rate)
-        nodes = (np.arange(parts)[:, None] + _NODES).ravel() / parts
-        weights = np.tile(_WEIGHTS / parts, parts)
+        nodes = (np.arange(parts)[:, None] + NODES).ravel() / parts
+        weights = np.tile(WEIGHTS / parts, parts)
         # The step in which x reaches 0 is forced only until then.
         forced = np.minimum(dt, phases * duration)
         s = forced[:, None] * nodes
-        kernel = _transition(dt - s, stiffness, damping)[..., 1]
+        kernel = spring_transition(dt - s, stiffness, damping)[..., 1]
         kernel *= (gain * forced[:, None] * weights)[..., None]
         psi = self.basis((phases[:, None] - s / duration).ravel())
         psi = psi.reshape(*s.shape, -1)
@@ -539,7 +482,7 @@ class Dmp:
         steps = math.ceil(1.0 / phase_step - 1e-9)
         phases: Array = 1.0 - phase_step * np.arange(steps, dtype=float)
         return StepTable(
-            transition=_transition(np.array(dt), stiffness, damping),
+            transition=spring_transition(np.array(dt), stiffness, damping),
             forcing=self._forcing_terms(phases, dt, duration),
             phase_step=phase_step,
             dt=dt,
@@ -579,7 +522,7 @@ class Dmp:
         response[2, inside] += gain * self.basis(phases[inside])
         return response
 
-    def _design(self, t: Array, duration: float | None) -> "_Design":
+    def _design(self, t: Array, duration: float | None) -> "Design":
         """The least-squares problem of a demonstration sampled at t (N,)."""
         duration = float(t[-1]) if duration is None else float(duration)
         make = (
@@ -591,7 +534,7 @@ class Dmp:
             (duration, t.tobytes()), lambda: make(t, duration)
         )
 
-    def _make_trajectory_design(self, t: Array, duration: float) -> "_Design":
+    def _make_trajectory_design(self, t: Array, duration: float) -> "Design":
         response = self._response_at(t, duration)
         # In units of the forcing term, in which a constant weight of 1 moves
         # the joint by 1 / k_S.
@@ -602,13 +545,13 @@ class Dmp:
             self._homogeneous(t, duration)[0],
         )
 
-    def _make_forcing_design(self, t: Array, duration: float) -> "_Design":
+    def _make_forcing_design(self, t: Array, duration: float) -> "Design":
         config = self._config
         psi = self.basis(np.clip(1.0 - t / duration, 0.0, 1.0))
         # Past the end there is no forcing to learn from.
         psi[t > duration * (1.0 + 1e-9)] = 0.0
         stretch = duration / config.duration
-        derivatives, fit = _smoothing_operator(t, config.smoothing)
+        derivatives, fit = smoothing_operator(t, config.smoothing)
         forcing = (
             self._stiffness * derivatives[0]
             + stretch * self._damping * derivatives[1]
@@ -620,10 +563,10 @@ class Dmp:
 
     def _finish_design(
         self, design: Array, operator: Array, decay: Array
-    ) -> "_Design":
+    ) -> "Design":
         gram = design.T @ design
         ridge = len(design) * self._config.ridge * np.eye(self.n_basis)
-        return _Design(operator, gram, decay, _factor(gram + ridge))
+        return Design(operator, gram, decay, factorize(gram + ridge))
 
     def _response_at(self, t: Array, duration: float) -> Array:
         """(N, K), the positions of `_response` at any t >= 0."""
@@ -644,111 +587,6 @@ class Dmp:
             + s**2 * (3.0 - 2.0 * s) * position[index + 1]
             - s**2 * (1.0 - s) * dt * velocity[index + 1]
         )
-
-
-class _Design(NamedTuple):
-    """θ = (gram + ridge)⁻¹ operator (q - g - decay [q0 - g, q̇0])."""
-
-    operator: Array  # (K, N)
-    gram: Array  # (K, K), without the ridge
-    decay: Array  # (N, 2)
-    factor: Any  # of gram with the ridge
-
-
-def _factor(gram: Array) -> Any:
-    try:
-        return cho_factor(gram, check_finite=False)
-    except np.linalg.LinAlgError:
-        raise InputError(
-            "dmp.ridge is too small for so few samples: the policy parameters "
-            "are not determined"
-        ) from None
-
-
-def _transition(t: Array, stiffness: float, damping: float) -> Array:
-    """exp(A t) for A = [[0, 1], [-k, -d]]: t (...) to (..., 2, 2)."""
-    half = 0.5 * damping
-    root = np.emath.sqrt(half**2 - stiffness)
-    scaled = root * t
-    slow = np.exp(scaled - half * t)
-    fast = np.exp(-scaled - half * t)
-    cosh = np.real(slow + fast) / 2.0
-    # sinh(root t) / root; by its own series where the difference would lose
-    # digits: there the damping is nearly critical, or t small.
-    small = np.abs(scaled) < 0.1
-    divisor = np.where(small, 1.0, 2.0 * scaled)
-    square = np.real(scaled**2)
-    series = 1.0 + square / 6.0 * (
-        1.0 + square / 20.0 * (1.0 + square / 42.0 * (1.0 + square / 72.0))
-    )
-    sinh = t * np.where(
-        small, series * np.exp(-half * t), np.real((slow - fast) / divisor)
-    )
-    result = np.empty((*np.shape(t), 2, 2))
-    result[..., 0, 0] = cosh + half * sinh
-    result[..., 0, 1] = sinh
-    result[..., 1, 0] = -stiffness * sinh
-    result[..., 1, 1] = cosh - half * sinh
-    return result
-
-
-def _smoothing_operator(
-    t: Array, smoothing: float
-) -> tuple[list[Array], Array]:
-    """A penalised spline fit, and its derivatives at the samples.
-
-    The spline S, of degree 5, minimizes the mean of (y - S(t))² plus
-    smoothing⁶ times the mean of its third derivative squared: it follows
-    oscillations slower than 1/smoothing (rad/s) and flattens faster ones.
-
-    Args:
-        t: (N,), s, increasing.
-        smoothing: s.
-
-    Returns:
-        Three arrays (N, M) that take the M spline coefficients to S, Ṡ and S̈
-        at t; and one (M, N) that takes the samples y to those coefficients.
-    """
-    degree = 5
-    pieces = max(1, math.ceil(1.5 * (t[-1] - t[0]) / smoothing))
-    pieces = min(pieces, 4 * len(t))
-    breaks = np.linspace(t[0], t[-1], pieces + 1)
-    knots = np.concatenate(
-        [np.full(degree, t[0]), breaks, np.full(degree, t[-1])]
-    )
-    spline = BSpline(knots, np.eye(len(knots) - degree - 1), degree)
-    derivatives = [spline(t, nu) for nu in range(3)]
-    middle = breaks[:-1, None] + np.diff(breaks)[:, None] * _NODES
-    third = spline(middle.ravel(), 3)
-    weights = np.tile(_WEIGHTS / pieces, pieces)
-    penalty = smoothing**6 * third.T @ (weights[:, None] * third)
-    gram = derivatives[0].T @ derivatives[0] / len(t) + penalty
-    scale = np.trace(gram) / len(gram)
-    gram[np.diag_indices_from(gram)] += 1e-13 * scale
-    fit = cho_solve(cho_factor(gram), derivatives[0].T / len(t))
-    return derivatives, fit
-
-
-def _pair(t: Any, q: Any) -> list[tuple[Array, Array]]:
-    """One demonstration or a list of them as a list of pairs of arrays."""
-    several = isinstance(t, (list, tuple)) and len(t) > 0 and np.ndim(t[0]) > 0
-    if not several:
-        t, q = [t], [q]
-    require(
-        len(t) == len(q),
-        "the number of demonstrations",
-        len(q),
-        f"{len(t)}, one for each array of times",
-    )
-    pairs = [
-        (np.asarray(a, dtype=float), np.asarray(b, dtype=float))
-        for a, b in zip(t, q, strict=True)
-    ]
-    widths = {b.shape[-1] if b.ndim else 0 for _, b in pairs}
-    require(
-        len(widths) == 1, "q.shape[1]", sorted(widths), "the same joints in all"
-    )
-    return pairs
 
 
 def _require_finite(field: str, value: Array) -> None:

@@ -9,13 +9,10 @@ if TYPE_CHECKING:
     from drake_affetto.skill.elm import ElmRegressor
     from drake_affetto.skill.mappings import Affine, Domain, Mapping, Similarity
     from drake_affetto.skill.policy import SkillPolicy, SkillPolicyConfig
+    from drake_affetto.skill.residuals import loo_covariance
     from drake_affetto.skill.scheme_names import SCHEMES
     from drake_affetto.skill.schemes import FineTuned, NoTransfer, make_scheme
-    from drake_affetto.skill.transfer import (
-        Start,
-        TransferRegressor,
-        loo_covariance,
-    )
+    from drake_affetto.skill.transfer import Start, TransferRegressor
 
 __getattr__, __dir__, __all__ = attach(
     __name__,
@@ -33,7 +30,7 @@ __getattr__, __dir__, __all__ = attach(
         "Start": "transfer",
         "TransferRegressor": "transfer",
         "input_jacobian": "adapters",
-        "loo_covariance": "transfer",
+        "loo_covariance": "residuals",
         "make_scheme": "schemes",
     },
 )

@@ -14,14 +14,12 @@ where h(x) lies narrows the choice; predictions average over the minima that
 fit; and h may be any differentiable map.
 """
 
-import functools
 import math
 from typing import Any, NamedTuple, Self
 import warnings
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import qmc
 from sklearn.base import (
     BaseEstimator,
     MultiOutputMixin,
@@ -45,15 +43,18 @@ from drake_affetto.skill.adapters import (
     SourceModel,
     source_domain,
     source_model,
-    unwrap_frozen,
 )
-from drake_affetto.skill.elm import ElmRegressor
 from drake_affetto.skill.mappings import (
     Affine,
     Domain,
     Mapping,
     Similarity,
     make_mapping,
+)
+from drake_affetto.skill.residuals import (
+    even_tasks,
+    expected_errors,
+    whitening,
 )
 from drake_affetto.skill.search import (
     Minima,
@@ -73,11 +74,6 @@ _MANY_MOMENTS = 0.3
 # λ of the bare Eq. 5, chosen there too.
 _PLAIN_ALPHA = 0.03
 
-# How far the covariance of an ELM's errors is shrunk to its diagonal, and the
-# least deviation of an error relative to that of its output. Chosen on draws
-# of the tutorial's strokes that it does not show.
-_SHRINKAGE = 0.5
-_LEAST_ERROR = 0.01
 
 _PRIORS = ("auto", "domain", "similar", "moments")
 
@@ -398,9 +394,9 @@ class TransferRegressor(
                 raise ValueError(
                     f"metric is {metric!r}, expected None, 'auto' or an array"
                 )
-            metric = _expected_errors(self.estimator, source, domain)
+            metric = expected_errors(self.estimator, source, domain)
         if metric is not None:
-            matrix = _whitening(metric, source.n_out)
+            matrix = whitening(metric, source.n_out)
             source, y = source.project(matrix), y @ matrix
             noise = 1.0
         else:
@@ -529,76 +525,6 @@ class TransferRegressor(
         return type(self)(**self.get_params(deep=False))
 
 
-def loo_covariance(
-    estimator: ElmRegressor,
-    X: ArrayLike,
-    y: ArrayLike,
-    shrinkage: float = 0.5,
-) -> Array:
-    """Covariance of the errors an ELM makes on samples it has not seen.
-
-    Some outputs of a skill depend on the task, others hardly do and only vary
-    with the demonstrations. Their leave-one-out errors tell them apart; as a
-    `metric` they keep a transfer from fitting what cannot be predicted.
-
-    Args:
-        estimator: which has learned the samples.
-        X: (N, d), those samples.
-        y: (N, F).
-        shrinkage: in [0, 1]: how far towards a diagonal matrix. With fewer
-            samples than outputs some is needed.
-
-    Returns:
-        (F, F), positive definite.
-
-    Raises:
-        ValueError: if the data or the shrinkage do not fit.
-    """
-    if not 0.0 <= shrinkage <= 1.0:
-        raise ValueError(
-            f"shrinkage is {shrinkage!r}, expected a number from 0 to 1"
-        )
-    residuals = estimator.loo_residuals(X, y)
-    residuals = residuals.reshape(len(residuals), -1)
-    return _shrunk(residuals.T @ residuals / len(residuals), shrinkage)
-
-
-def _shrunk(
-    covariance: Array, shrinkage: float, floor: float | Array = 0.0
-) -> Array:
-    """On the way to its diagonal, with a floor (F,) of the variances."""
-    variances = np.diag(covariance)
-    # No output is known better than a thousandth of the worst.
-    least = max(1e-6 * float(variances.max()), 1e-300)
-    return (1.0 - shrinkage) * covariance + np.diag(
-        shrinkage * variances + floor + least
-    )
-
-
-def _expected_errors(
-    estimator: Any, source: SourceModel, domain: Domain | None
-) -> Array | None:
-    """Covariance (F, F) of the errors of an ELM's predictions; else None.
-
-    That of a new sample, averaged over the tasks of the domain: the noise of
-    the outputs, and what the samples have left open of the function.
-    """
-    elm = unwrap_frozen(estimator)
-    if not isinstance(elm, ElmRegressor) or source.n_out == 1:
-        return None
-    try:
-        covariance = elm.error_covariance_
-    except AttributeError:
-        return None
-    assert domain is not None
-    tasks = domain.low + _even_tasks(source.n_in) * (domain.high - domain.low)
-    predicted, _ = source.evaluate(tasks)
-    covariance = covariance * (1.0 + np.mean(elm.leverage(tasks)))
-    # A skill that fits its samples exactly is still not exact elsewhere.
-    floor = _LEAST_ERROR**2 * np.var(predicted, axis=0)
-    return _shrunk(covariance, _SHRINKAGE, floor)
-
-
 def _make_prior(
     terms: frozenset[str],
     domain: Domain | None,
@@ -618,42 +544,17 @@ def _make_prior(
     )
 
 
-def _whitening(metric: ArrayLike, n_out: int) -> Array:
-    """L (F, F) such that errors e with that covariance have e L white."""
-    covariance = np.asarray(metric, dtype=float)
-    if covariance.shape == (n_out,):
-        covariance = np.diag(covariance)
-    if covariance.shape != (n_out, n_out):
-        raise ValueError(
-            f"metric has shape {np.shape(metric)}, expected ({n_out},) or "
-            f"({n_out}, {n_out})"
-        )
-    try:
-        root = np.linalg.cholesky(covariance)
-    except np.linalg.LinAlgError:
-        raise ValueError(
-            "metric is not positive definite, as a covariance of errors is"
-        ) from None
-    return np.linalg.inv(root).T
-
-
 def _spread(source: SourceModel, y: Array, domain: Domain | None) -> float:
     """The variance of an output over the tasks; the mean over the outputs."""
     values = y
     if domain is not None:
         # The few y there are would tell it badly.
-        tasks = _even_tasks(source.n_in)
+        tasks = even_tasks(source.n_in)
         values, _ = source.evaluate(
             domain.low + tasks * (domain.high - domain.low)
         )
     spread = float(np.mean(np.var(values, axis=0)))
     return spread if spread > 0.0 else max(float(np.mean(y**2)), 1e-12)
-
-
-@functools.cache
-def _even_tasks(n_in: int) -> Array:
-    """64 points that fill [0, 1]^n_in evenly."""
-    return qmc.Halton(n_in, seed=0).random(64)
 
 
 def _same_or_unit(target: Domain, n_out: int) -> Domain:

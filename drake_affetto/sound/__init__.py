@@ -15,7 +15,9 @@ if TYPE_CHECKING:
         spectrogram,
         tap_prototypes,
     )
-    from drake_affetto.sound.voice import DrumVoice, VoiceConfig, write_wav
+    from drake_affetto.sound.voice import DrumVoice
+    from drake_affetto.sound.voice_config import VoiceConfig
+    from drake_affetto.sound.wav import write_wav
 
 __getattr__, __dir__, __all__ = attach(
     __name__,
@@ -24,13 +26,13 @@ __getattr__, __dir__, __all__ = attach(
         "DrumVoice": "voice",
         "RewardConfig": "reward",
         "SoundConfig": "config",
-        "VoiceConfig": "voice",
+        "VoiceConfig": "voice_config",
         "cut_prototype": "reward",
         "load_sound_config": "config",
         "reward_over_time": "reward",
         "similarity": "reward",
         "spectrogram": "reward",
         "tap_prototypes": "reward",
-        "write_wav": "voice",
+        "write_wav": "wav",
     },
 )

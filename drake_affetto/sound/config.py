@@ -4,7 +4,7 @@ import dataclasses
 
 from drake_affetto.common.errors import require_range
 from drake_affetto.sound.reward import RewardConfig
-from drake_affetto.sound.voice import VoiceConfig
+from drake_affetto.sound.voice_config import VoiceConfig
 
 
 @dataclasses.dataclass

@@ -12,7 +12,7 @@ from drake_affetto.common.errors import InputError, require, require_range
 from drake_affetto.common.resources import models_dir
 from drake_affetto.common.yaml_config import read_yaml, typed
 from drake_affetto.control.pidf_controller import PidfConfig
-from drake_affetto.motion.dmp import DmpConfig
+from drake_affetto.motion.dmp_config import DmpConfig
 from drake_affetto.perception.blob import BlobConfig
 from drake_affetto.perception.config import (
     CameraConfig,

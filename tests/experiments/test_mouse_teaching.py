@@ -18,7 +18,8 @@ from drake_affetto.experiments.mouse_teaching import (
 )
 from drake_affetto.experiments.plans import TeachPlan
 from drake_affetto.experiments.teaching_session import TeachingSession
-from drake_affetto.motion.dmp import Dmp, DmpConfig
+from drake_affetto.motion.dmp import Dmp
+from drake_affetto.motion.dmp_config import DmpConfig
 from drake_affetto.sound.reward import RewardConfig
 from drake_affetto.teaching import mouse_teacher
 from drake_affetto.teaching.demonstrations import read_demonstrations

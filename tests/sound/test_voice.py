@@ -10,14 +10,14 @@ from scipy.io import wavfile
 
 from drake_affetto.common.errors import InputError
 from drake_affetto.sound import impact
-from drake_affetto.sound.voice import (
+from drake_affetto.sound.voice import DrumVoice
+from drake_affetto.sound.voice_config import (
     BodyConfig,
-    DrumVoice,
     HissConfig,
     MembraneConfig,
     VoiceConfig,
-    write_wav,
 )
+from drake_affetto.sound.wav import write_wav
 
 # f_mn / f_01 of an ideal membrane, as textbooks print them.
 TEXTBOOK_RATIOS = {
