@@ -22,11 +22,15 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder
 
 from drake_affetto.experiments.camera_preview import (
-    make_sight,
+    make_gaze_geometry,
     turn_to,
 )
 from drake_affetto.experiments.episode import TrialRunner
-from drake_affetto.experiments.view_maps import CHANGED_VIEWS, REFERENCE, View
+from drake_affetto.experiments.view_maps import (
+    CHANGED_VIEWS,
+    REFERENCE,
+    ViewDomain,
+)
 from drake_affetto.perception.blob import detect
 from drake_affetto.perception.imaging import ImageEffects
 from drake_affetto.perception.mirror_camera import DIRECT, find_frame
@@ -46,16 +50,18 @@ def sized(name: str, scale: int) -> Scenario:
     return scenario
 
 
-def view_of(scenario: Scenario, name: str) -> View:
+def view_of(scenario: Scenario, name: str) -> ViewDomain:
     """The scenario's station with its sight, without noise in the image."""
     station = AffettoStation(scenario)
     context = station.CreateDefaultContext()
     camera = station.camera.GetMyMutableContextFromRoot(context)
     station.camera.set_effects(camera, ImageEffects())
-    return View(name, station, context, make_sight(station, context))
+    return ViewDomain(
+        name, station, context, make_gaze_geometry(station, context)
+    )
 
 
-def random_place(view: View, rng: np.random.Generator) -> tuple:
+def random_place(view: ViewDomain, rng: np.random.Generator) -> tuple:
     """(xy, yaw): a drum on the table about its region, and a yaw about it."""
     region = view.station.scenario.drum_region
     xy = rng.uniform(
@@ -69,7 +75,7 @@ def random_place(view: View, rng: np.random.Generator) -> tuple:
     return xy, float(np.clip(middle + rng.uniform(-0.3, 0.3), -0.5, 0.5))
 
 
-def whole_views(view: View, xy: np.ndarray, yaw: float) -> list:
+def whole_views(view: ViewDomain, xy: np.ndarray, yaw: float) -> list:
     """(kind, centroid, outline) of each image of the marker that is whole."""
     model = view.sight.model
     size = np.array([model.camera.width, model.camera.height])
@@ -162,7 +168,7 @@ def false_alarms(quick: bool) -> None:
             xy = rng.uniform([0.2, -0.2], [0.4, 0.25])
             world.set_posture(station.plant, plant, posture)
             station.set_drum_position(context, xy)
-            sight = make_sight(station, context)
+            sight = make_gaze_geometry(station, context)
             yaw = posture[station.scenario.yaw_joint]
             views = [
                 sight.model.view(xy, yaw, mirror)
@@ -268,7 +274,7 @@ def gaze(quick: bool) -> None:
     for name in (REFERENCE, "mirror"):
         scenario = load_scenario(name)
         trials = TrialRunner(scenario)
-        sight = make_sight(trials.station, trials.context)
+        sight = make_gaze_geometry(trials.station, trials.context)
         n = 2 if quick else 4
         region = scenario.drum_region
         places = np.stack(

@@ -18,7 +18,7 @@ import numpy as np
 
 from drake_affetto.common.output import prepare_output, write_text_atomic
 from drake_affetto.experiments.camera_preview import turn_to, write_image
-from drake_affetto.experiments.view_maps import View
+from drake_affetto.experiments.view_maps import ViewDomain
 from drake_affetto.perception.blob import BlobConfig, detect, marker_lab
 from drake_affetto.perception.drawing import Canvas
 from drake_affetto.perception.imaging import ImageEffects, apply_effects
@@ -169,7 +169,7 @@ def collect(name: str, places: int, seed: int) -> list[tuple]:
 
     Each is (image, uv, outline).
     """
-    view = View.of(name)
+    view = ViewDomain.of(name)
     rng = np.random.default_rng(seed)
     scenario = view.station.scenario
     camera = view.station.camera.GetMyMutableContextFromRoot(view.context)

@@ -26,7 +26,7 @@ from drake_affetto.experiments.view_maps import (
     REFERENCE,
     CalibrationError,
     TrueMap,
-    View,
+    ViewDomain,
     fit_affine,
     fit_optical,
     fit_projective,
@@ -116,7 +116,7 @@ def draw_maps(
     plt.close(figure)
 
 
-def learn(true: TrueMap, reference: View, repeats: int) -> list:
+def learn(true: TrueMap, reference: ViewDomain, repeats: int) -> list:
     """Curves of error against samples for the maps of a mirrored view."""
     noise = measurement_noise(true.view), measurement_noise(reference)
     optical = make_optical_map(true.view, reference)
@@ -186,7 +186,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=40)
     args = parser.parse_args()
     out = prepare_output(args.out)
-    reference = View.of(REFERENCE)
+    reference = ViewDomain.of(REFERENCE)
     rows = [
         [
             "view",
@@ -200,7 +200,7 @@ def main() -> None:
     ]
     maps = []
     for name in CHANGED_VIEWS:
-        true = measure_true_map(View.of(name), reference)
+        true = measure_true_map(ViewDomain.of(name), reference)
         row, distances = describe(true)
         rows.append(row)
         maps.append((true, distances))

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from pydrake.systems.framework import Context
 
     from drake_affetto.common.typing import Array
-    from drake_affetto.experiments.camera_preview import Sight
+    from drake_affetto.experiments.camera_preview import GazeGeometry
     from drake_affetto.station.station import AffettoStation
 
 
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     from drake_affetto.experiments.camera_preview import (
         calibration_yaml,
         draw_view,
-        make_sight,
+        make_gaze_geometry,
         turn_to,
         write_gaze_video,
         write_image,
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     scenario = load_scenario(args.scenario)
     if args.calibrate:
         station = AffettoStation(scenario)
-        sight = make_sight(station, station.CreateDefaultContext())
+        sight = make_gaze_geometry(station, station.CreateDefaultContext())
         print(calibration_yaml(sight.calibration()))
         return 0
     out = prepare_output(args.out)
@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     station.camera.set_seed(
         station.camera.GetMyMutableContextFromRoot(context), args.seed
     )
-    sight = make_sight(station, context)
+    sight = make_gaze_geometry(station, context)
     yaw = sight.looking_yaw(xy)
     for name, angle in (("start", None), ("look", yaw)):
         if angle is not None:
@@ -106,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
 def _print_findings(
     station: "AffettoStation",
     context: "Context",
-    sight: "Sight",
+    sight: "GazeGeometry",
     xy: "Array",
     yaw: float,
 ) -> None:

@@ -29,7 +29,7 @@ _CALIBRATION_GRID = 9  # positions along each side of the drum's region
 
 
 @dataclasses.dataclass
-class Sight:
+class GazeGeometry:
     """A station's geometry of seeing, at its start posture.
 
     Attributes:
@@ -95,11 +95,13 @@ def region_grid(scenario: Scenario, n: int) -> Array:
     return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
-def make_sight(station: AffettoStation, context: Context) -> Sight:
+def make_gaze_geometry(
+    station: AffettoStation, context: Context
+) -> GazeGeometry:
     """The geometry of seeing in a station's context."""
     scenario = station.scenario
     plant_context = station.plant.GetMyContextFromRoot(context)
-    return Sight(
+    return GazeGeometry(
         make_camera_model(
             station.plant, plant_context, scenario.camera, scenario.yaw_joint
         ),
@@ -121,7 +123,11 @@ def turn_to(station: AffettoStation, context: Context, yaw: float) -> None:
 
 
 def draw_view(
-    image: Image, pixels: Array, sight: Sight, yaw: float, scenario: Scenario
+    image: Image,
+    pixels: Array,
+    sight: GazeGeometry,
+    yaw: float,
+    scenario: Scenario,
 ) -> Canvas:
     """An image with blob, calibration grid and the drum's region.
 
@@ -141,7 +147,7 @@ def draw_view(
 
 
 def _region_outlines(
-    sight: Sight, yaw: float, scenario: Scenario
+    sight: GazeGeometry, yaw: float, scenario: Scenario
 ) -> list[Array]:
     """The drum region's border at the marker's height, as it is seen (n, 2).
 
@@ -200,13 +206,15 @@ def write_gaze_video(
             writer.write(np.ascontiguousarray(image[..., ::-1]))
 
         try:
-            sight = make_sight(trials.station, trials.context)
+            sight = make_gaze_geometry(trials.station, trials.context)
             trials.gaze(xy, seed, film, linger=1.0)
         finally:
             writer.release()
 
 
-def _gaze_frame(trials: TrialRunner, sight: Sight, elapsed: float) -> Image:
+def _gaze_frame(
+    trials: TrialRunner, sight: GazeGeometry, elapsed: float
+) -> Image:
     """The camera's image at one moment of a search, with what it found."""
     scenario = trials.scenario
     index = trials.station.joints.names.index(scenario.yaw_joint)

@@ -226,10 +226,12 @@ def _mapping(scenario: str, name: str) -> str | Mapping:
         return name
     from drake_affetto.experiments.view_maps import (
         REFERENCE,
-        View,
+        ViewDomain,
         make_optical_map,
     )
     from drake_affetto.skill.optical import OpticalMapping
 
-    optical = make_optical_map(View.of(scenario), View.of(REFERENCE))
+    optical = make_optical_map(
+        ViewDomain.of(scenario), ViewDomain.of(REFERENCE)
+    )
     return OpticalMapping(**vars(optical))

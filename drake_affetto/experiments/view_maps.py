@@ -15,8 +15,8 @@ from scipy.optimize import least_squares
 
 from drake_affetto.common.typing import Array
 from drake_affetto.experiments.camera_preview import (
-    Sight,
-    make_sight,
+    GazeGeometry,
+    make_gaze_geometry,
     region_grid,
     turn_to,
 )
@@ -41,20 +41,20 @@ REFERENCE = "drumming"
 
 
 @dataclasses.dataclass
-class View:
+class ViewDomain:
     """A scenario's station, and the geometry of its seeing."""
 
     name: str
     station: AffettoStation
     context: Context
-    sight: Sight
+    sight: GazeGeometry
 
     @classmethod
-    def of(cls, name: str) -> "View":
+    def of(cls, name: str) -> "ViewDomain":
         """Builds the station of the scenario `name`."""
         station = AffettoStation(load_scenario(name))
         context = station.CreateDefaultContext()
-        return cls(name, station, context, make_sight(station, context))
+        return cls(name, station, context, make_gaze_geometry(station, context))
 
     @property
     def calibration(self) -> BlobCalibration:
@@ -102,11 +102,11 @@ class TrueMap:
         reference: the view in which the skill was learned.
     """
 
-    view: View
+    view: ViewDomain
     xy: Array
     target: Array
     source: Array
-    reference: View
+    reference: ViewDomain
 
     def distance(self, guessed: Array) -> Array:
         """(n,) distance [m] on the table of guessed τ (n, 2) from the true."""
@@ -117,7 +117,7 @@ class TrueMap:
         )
 
 
-def places_of(view: View, tau: Array) -> Array:
+def places_of(view: ViewDomain, tau: Array) -> Array:
     """xy (n, 2) [m] of the drum for τ = [y_img, q₃*] (n, 2) in a view."""
     model, box = view.sight.model, view.calibration
     places = []
@@ -128,7 +128,9 @@ def places_of(view: View, tau: Array) -> Array:
     return np.array(places)
 
 
-def measure_true_map(view: View, reference: View, n: int = 9) -> TrueMap:
+def measure_true_map(
+    view: ViewDomain, reference: ViewDomain, n: int = 9
+) -> TrueMap:
     """The true map over the changed view's drum region, n × n places.
 
     The same task is the same place relative to the robot: where its base has
@@ -247,7 +249,7 @@ def _linear(
     return lambda Z: terms((Z - middle) / size) @ weights + offset
 
 
-def make_optical_map(view: View, reference: View) -> OpticalMap:
+def make_optical_map(view: ViewDomain, reference: ViewDomain) -> OpticalMap:
     """The optical map of a mirrored view, everything but the mirror known."""
     assert view.sight.fixed_yaw is not None
     return OpticalMap(
@@ -292,8 +294,8 @@ def with_error(
 
 def with_wrong_camera(
     optical: OpticalMap,
-    view: View,
-    reference: View,
+    view: ViewDomain,
+    reference: ViewDomain,
     error: CalibrationError,
     rng: np.random.Generator,
 ) -> OpticalMap:
@@ -362,7 +364,7 @@ def learn_from_few(
     return SampleCurve(name, np.array(samples), errors)
 
 
-def measurement_noise(view: View) -> Array:
+def measurement_noise(view: ViewDomain) -> Array:
     """(2,) what the gaze servo leaves uncertain of a view's τ, as measured.
 
     0.1 pixels in the image and 0.001 rad of yaw.

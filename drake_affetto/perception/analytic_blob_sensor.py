@@ -26,8 +26,8 @@ from drake_affetto.perception.blob import Blob, BlobConfig
 from drake_affetto.perception.blob_sensor import BlobReporter
 from drake_affetto.perception.config import CameraConfig
 from drake_affetto.perception.mirror_camera import (
+    CameraSnapshot,
     MirrorCamera,
-    Sight,
     find_frame,
 )
 
@@ -46,8 +46,8 @@ class AnalyticBlobSensor(BlobReporter):
         - blob_pixels
 
     - query_object: the SceneGraph's query port; where marker and robot are.
-    - sight: `Sight` of a `MirrorCamera`, whose parameters (poses, noise, seed)
-      it so obeys.
+    - sight: `CameraSnapshot` of a `MirrorCamera`; its parameters (poses, noise,
+      seed) hold here too.
     - blob (3), blob_pixels (4): as of `BlobSensor`.
 
     The marker's outline is projected, cut by mirror and image, and the robot's
@@ -100,7 +100,7 @@ class AnalyticBlobSensor(BlobReporter):
             "query_object", Value(QueryObject())
         )
         self._sight_port = self.DeclareAbstractInputPort(
-            "sight", Value(Sight(np.eye(4)))
+            "sight", Value(CameraSnapshot(np.eye(4)))
         )
         self._declare_outputs(
             {
@@ -122,11 +122,11 @@ class AnalyticBlobSensor(BlobReporter):
         camera: MirrorCamera,
         config: BlobConfig | None = None,
         radius: float,
+        name: str = "blob_sensor",
     ) -> "AnalyticBlobSensor":
         """Adds a sensor in the place of a BlobSensor, under its name."""
         sensor = AnalyticBlobSensor(plant, camera.config, config, radius=radius)
-        sensor.set_name("blob_sensor")
-        builder.AddSystem(sensor)
+        builder.AddNamedSystem(name, sensor)
         builder.Connect(query_object, sensor.get_query_object_input_port())
         builder.Connect(
             camera.get_sight_output_port(), sensor.get_sight_input_port()

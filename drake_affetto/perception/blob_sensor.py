@@ -151,11 +151,11 @@ class BlobSensor(BlobReporter):
         builder: DiagramBuilder,
         color_image: OutputPort,
         config: BlobConfig | None = None,
+        name: str = "blob_sensor",
     ) -> "BlobSensor":
         """Adds a sensor that looks at `color_image`."""
         sensor = BlobSensor(config)
-        sensor.set_name("blob_sensor")
-        builder.AddSystem(sensor)
+        builder.AddNamedSystem(name, sensor)
         builder.Connect(color_image, sensor.get_color_image_input_port())
         return sensor
 

@@ -165,13 +165,13 @@ class GazeServo(LeafSystem):
         config: GazeConfig | None = None,
         rate: float = 10.0,
         latency: float = 0.0,
+        name: str = "gaze_servo",
     ) -> "GazeServo":
         """Adds a servo wired to a blob sensor and to the joints' state."""
         servo = GazeServo(
             estimated_state.size() // 2, yaw_index, view, config, rate, latency
         )
-        servo.set_name("gaze_servo")
-        builder.AddSystem(servo)
+        builder.AddNamedSystem(name, servo)
         builder.Connect(blob, servo.get_blob_input_port())
         builder.Connect(estimated_state, servo.get_estimated_state_input_port())
         return servo

@@ -105,7 +105,7 @@ def find_frame(plant: MultibodyPlant, name: str) -> Frame:
 
 
 @dataclasses.dataclass(frozen=True)
-class Sight:
+class CameraSnapshot:
     """What an image depends on, beside the scene.
 
     Attributes:
@@ -142,8 +142,8 @@ class MirrorCamera(LeafSystem):
       evaluated, as RgbdSensor does; nothing is rendered before.
     - label_image: ImageLabel16I of the true view: a mirror is its panel.
     - body_pose_in_world: RigidTransform X_WC.
-    - sight: `Sight`, where camera and mirrors are and what disturbs the
-      image; for `AnalyticBlobSensor`. Evaluating it renders nothing.
+    - sight: `CameraSnapshot`, where camera and mirrors are and what disturbs
+      the image; for `AnalyticBlobSensor`. Evaluating it renders nothing.
 
     The engine has no reflections of the scene. A planar mirror is exact with
     a second, virtual camera: the true camera, reflected in the mirror's
@@ -248,7 +248,10 @@ class MirrorCamera(LeafSystem):
             scene,
         )
         self._sight_port = self.DeclareAbstractOutputPort(
-            "sight", Value(Sight(np.eye(4))).Clone, self._calc_sight, scene
+            "sight",
+            Value(CameraSnapshot(np.eye(4))).Clone,
+            self._calc_sight,
+            scene,
         )
 
     @staticmethod
@@ -260,12 +263,12 @@ class MirrorCamera(LeafSystem):
         config: CameraConfig,
         mirrors: list[MirrorConfig] | None = None,
         render_config: RenderConfig | None = None,
+        name: str = "camera",
     ) -> "MirrorCamera":
         """Adds a camera, and the renderers it needs, wired to the scene."""
         add_renderers(scene_graph, render_config or RenderConfig())
         camera = MirrorCamera(plant, config, mirrors)
-        camera.set_name("camera")
-        builder.AddSystem(camera)
+        builder.AddNamedSystem(name, camera)
         builder.Connect(
             scene_graph.get_query_output_port(),
             camera.get_query_object_input_port(),
@@ -514,7 +517,7 @@ class MirrorCamera(LeafSystem):
     def _calc_sight(self, context: Any, output: Any) -> None:
         query = self._query(context)
         output.set_value(
-            Sight(
+            CameraSnapshot(
                 self._X_WC(context, query),
                 self._camera_id.get_value(),
                 tuple(

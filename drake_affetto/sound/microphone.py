@@ -120,6 +120,7 @@ class DrumMicrophone(LeafSystem):
         plant: MultibodyPlant,
         drum_model: str = "drum",
         table_model: str = "table",
+        name: str = "drum_microphone",
     ) -> "DrumMicrophone":
         """Adds a microphone at the drum of `plant` and wires its inputs.
 
@@ -150,8 +151,7 @@ class DrumMicrophone(LeafSystem):
             table=table,
             X_BH=head_center.GetFixedPoseInBodyFrame(),
         )
-        microphone.set_name("drum_microphone")
-        builder.AddSystem(microphone)
+        builder.AddNamedSystem(name, microphone)
         builder.Connect(
             plant.get_contact_results_output_port(),
             microphone.get_contact_results_input_port(),

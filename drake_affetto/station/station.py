@@ -368,10 +368,13 @@ class AffettoStation(Diagram):
             spread.get_output_port(),
             self.plant.get_actuation_input_port(self._robot),
         )
-        for name in ("actuation", "chamber_pressure", "mass_flow"):
-            builder.ExportOutput(
-                self.actuation.GetOutputPort(name), f"affetto.{name}"
-            )
+        _export(
+            builder,
+            "affetto",
+            self.actuation.get_actuation_output_port(),
+            self.actuation.get_chamber_pressure_output_port(),
+            self.actuation.get_mass_flow_output_port(),
+        )
 
     def _add_sight(self, builder: DiagramBuilder) -> None:
         # The renderers stand in a copy of the scene: a SceneGraph hands each
@@ -408,23 +411,25 @@ class AffettoStation(Diagram):
                 color_image=self.camera.get_color_image_output_port(),
                 config=self.scenario.blob,
             )
-        for system, names in (
-            (self.camera, ("color_image", "label_image")),
-            (self.blob_sensor, ("blob", "blob_pixels")),
-        ):
-            for name in names:
-                builder.ExportOutput(
-                    system.GetOutputPort(name), f"camera.{name}"
-                )
+        _export(
+            builder,
+            "camera",
+            self.camera.get_color_image_output_port(),
+            self.camera.get_label_image_output_port(),
+            self.blob_sensor.get_blob_output_port(),
+            self.blob_sensor.get_blob_pixels_output_port(),
+        )
 
     def _add_hearing(self, builder: DiagramBuilder) -> None:
         self.microphone = DrumMicrophone.AddToBuilder(
             builder=builder, plant=self.plant
         )
-        for name in ("contact_force", "knock_force"):
-            builder.ExportOutput(
-                self.microphone.GetOutputPort(name), f"drum.{name}"
-            )
+        _export(
+            builder,
+            "drum",
+            self.microphone.get_contact_force_output_port(),
+            self.microphone.get_knock_force_output_port(),
+        )
 
     def _add_motion(self, builder: DiagramBuilder) -> OutputPort:
         """Adds what moves the robot; returns [q; q̇] desired."""
@@ -475,8 +480,27 @@ class AffettoStation(Diagram):
             self.policy.get_start_time_output_port(),
             self.dmp_source.get_start_time_input_port(),
         )
-        # The gaze turns the yaw away from where the movement has it; once it
-        # is done it returns, and what is left is the movement.
+        _export(
+            builder,
+            "affetto",
+            self.policy.get_policy_parameters_output_port(),
+            self.policy.get_start_time_output_port(),
+            self.gaze.get_task_parameter_output_port(),
+            self.gaze.get_settled_output_port(),
+        )
+        return self._add_gaze_turn(
+            builder, self.dmp_source.get_desired_state_output_port()
+        )
+
+    def _add_gaze_turn(
+        self, builder: DiagramBuilder, movement: OutputPort
+    ) -> OutputPort:
+        """Adds the gaze's turn to the movement; returns [q; q̇] desired.
+
+        The gaze turns the yaw away from the movement's yaw. It returns when
+        it is done, so that only the movement is left.
+        """
+        n = self.num_joints
         turn = np.zeros((2 * n, 1))
         turn[self._yaw] = 1.0
         spread = builder.AddNamedSystem("gaze_turn", MatrixGain(D=turn))
@@ -488,22 +512,9 @@ class AffettoStation(Diagram):
         builder.Connect(
             self.gaze.get_yaw_command_output_port(), spread.get_input_port()
         )
-        for i, port in enumerate(
-            (
-                self.dmp_source.get_desired_state_output_port(),
-                spread.get_output_port(),
-                straight.get_output_port(),
-            )
-        ):
-            builder.Connect(port, total.get_input_port(i))
-        for system, names in (
-            (self.policy, ("policy_parameters", "start_time")),
-            (self.gaze, ("task_parameter", "settled")),
-        ):
-            for name in names:
-                builder.ExportOutput(
-                    system.GetOutputPort(name), f"affetto.{name}"
-                )
+        builder.Connect(movement, total.get_input_port(0))
+        builder.Connect(spread.get_output_port(), total.get_input_port(1))
+        builder.Connect(straight.get_output_port(), total.get_input_port(2))
         return total.get_output_port()
 
     def _add_control(
@@ -523,23 +534,28 @@ class AffettoStation(Diagram):
             "equilibrium_offset",
             ConstantVectorSource(np.zeros(self.num_joints)),
         )
-        for source, port in (
-            (desired, "desired_state"),
-            (self._estimated_state, "estimated_state"),
-            (
-                self.actuation.get_chamber_pressure_output_port(),
-                "chamber_pressure",
-            ),
-            (self._offset.get_output_port(), "equilibrium_offset"),
-        ):
-            builder.Connect(source, self.controller.GetInputPort(port))
+        builder.Connect(desired, self.controller.get_desired_state_input_port())
+        builder.Connect(
+            self._estimated_state,
+            self.controller.get_estimated_state_input_port(),
+        )
+        builder.Connect(
+            self.actuation.get_chamber_pressure_output_port(),
+            self.controller.get_chamber_pressure_input_port(),
+        )
+        builder.Connect(
+            self._offset.get_output_port(),
+            self.controller.get_equilibrium_offset_input_port(),
+        )
         builder.Connect(
             self.controller.get_valve_opening_output_port(), command
         )
-        for name in ("valve_opening", "pid_output"):
-            builder.ExportOutput(
-                self.controller.GetOutputPort(name), f"affetto.{name}"
-            )
+        _export(
+            builder,
+            "affetto",
+            self.controller.get_valve_opening_output_port(),
+            self.controller.get_pid_output_output_port(),
+        )
 
     def set_equilibrium_offset(
         self, context: Context, offset: Sequence[float] | np.ndarray
@@ -549,3 +565,9 @@ class AffettoStation(Diagram):
             self._sub(self._offset, context)
         )
         value.SetFromVector(np.asarray(offset, float))
+
+
+def _export(builder: DiagramBuilder, part: str, *ports: OutputPort) -> None:
+    """Exports output ports under their own names, as parts of the robot."""
+    for port in ports:
+        builder.ExportOutput(port, f"{part}.{port.get_name()}")

@@ -8,7 +8,7 @@ import pytest
 
 from drake_affetto.cli.main import main
 from drake_affetto.experiments.camera_preview import (
-    make_sight,
+    make_gaze_geometry,
     region_grid,
 )
 from drake_affetto.experiments.episode import TrialRunner
@@ -45,7 +45,7 @@ def test_it_draws_what_the_camera_sees(name, tmp_path, capsys):
 def test_the_scenarios_calibration_is_the_computed_one(name):
     scenario = load_scenario(name)
     station = AffettoStation(scenario)
-    sight = make_sight(station, station.CreateDefaultContext())
+    sight = make_gaze_geometry(station, station.CreateDefaultContext())
     computed = sight.calibration()
     for field in dataclasses.fields(BlobCalibration):
         assert getattr(scenario.blob.calibration, field.name) == pytest.approx(
@@ -81,7 +81,7 @@ def test_a_drum_that_cannot_be_looked_at_is_refused(capsys, tmp_path):
 def test_the_gaze_settles_on_the_true_task_parameter(name):
     scenario = load_scenario(name)
     trials = TrialRunner(scenario)
-    sight = make_sight(trials.station, trials.context)
+    sight = make_gaze_geometry(trials.station, trials.context)
     xy = np.array([scenario.drum_region.x[1], scenario.drum_region.y[1]])
     taus = []
     for seed in (0, 1):

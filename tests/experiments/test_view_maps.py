@@ -7,7 +7,7 @@ from drake_affetto.experiments.view_maps import (
     CHANGED_VIEWS,
     REFERENCE,
     CalibrationError,
-    View,
+    ViewDomain,
     fit_affine,
     fit_optical,
     fit_projective,
@@ -23,12 +23,12 @@ from drake_affetto.experiments.view_maps import (
 
 @pytest.fixture(scope="module")
 def reference():
-    return View.of(REFERENCE)
+    return ViewDomain.of(REFERENCE)
 
 
 @pytest.fixture(scope="module")
 def mirror(reference):
-    return measure_true_map(View.of("mirror"), reference, n=6)
+    return measure_true_map(ViewDomain.of("mirror"), reference, n=6)
 
 
 def some(n=30, seed=0):
@@ -63,7 +63,7 @@ def test_each_fit_finds_a_map_of_its_kind():
 
 @pytest.mark.parametrize("name", CHANGED_VIEWS)
 def test_each_changed_view_sees_all_of_its_region(name, reference):
-    view = View.of(name)
+    view = ViewDomain.of(name)
     true = measure_true_map(view, reference, n=3)
     assert len(true.target) == 9
     corners = view.sight.positions[[0, 8, 40, 72, 80]]
@@ -72,7 +72,7 @@ def test_each_changed_view_sees_all_of_its_region(name, reference):
 
 
 def test_a_moved_robot_changes_nothing_as_its_camera_moves_along(reference):
-    true = measure_true_map(View.of("robot_moved"), reference, n=4)
+    true = measure_true_map(ViewDomain.of("robot_moved"), reference, n=4)
     np.testing.assert_allclose(true.target, true.source, atol=1e-6)
 
 

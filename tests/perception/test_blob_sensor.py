@@ -3,6 +3,7 @@
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
+from pydrake.systems.primitives import ConstantValueSource
 from pydrake.systems.sensors import ImageRgba8U
 import pytest
 
@@ -129,3 +130,20 @@ def test_no_image_is_drawn_before_someone_asks_and_one_serves_both_ports():
 def test_bad_settings_are_refused():
     with pytest.raises(InputError, match=r"blob\.hue_tolerance"):
         BlobSensor(BlobConfig(hue_tolerance=0.0))
+
+
+def test_two_sensors_stand_in_one_diagram():
+    builder = DiagramBuilder()
+    for name in ("left_eye", "right_eye"):
+        image = builder.AddNamedSystem(
+            f"{name}_image", ConstantValueSource(Value(ImageRgba8U(32, 24)))
+        )
+        BlobSensor.AddToBuilder(
+            builder=builder,
+            color_image=image.get_output_port(),
+            config=BlobConfig([1.0, 0.0, 0.0]),
+            name=name,
+        )
+    diagram = builder.Build()
+    assert diagram.HasSubsystemNamed("left_eye")
+    assert diagram.HasSubsystemNamed("right_eye")

@@ -336,3 +336,28 @@ def test_settings_that_do_not_fit_are_named():
         )
     with pytest.raises(InputError, match=r"lights\[0\]\.type"):
         RenderConfig(lights=[LightConfig(type="candle")]).check("rendering")
+
+
+def test_two_cameras_stand_in_one_diagram():
+    builder = DiagramBuilder()
+    plant, scene_graph = scene.add_scene(builder, n_mirrors=1)
+    cameras = [
+        MirrorCamera.AddToBuilder(
+            builder=builder,
+            plant=plant,
+            scene_graph=scene_graph,
+            config=CameraConfig(frame="camera", fov_y=fov_y),
+            mirrors=[MirrorConfig("mirror0::mirror", *scene.MIRROR_SIZE)],
+            name=name,
+        )
+        for name, fov_y in (("wide", 1.3), ("narrow", 0.6))
+    ]
+    root = builder.Build().CreateDefaultContext()
+    wide, narrow = (
+        camera.get_color_image_output_port()
+        .Eval(camera.GetMyContextFromRoot(root))
+        .data.copy()
+        for camera in cameras
+    )
+    assert wide.shape == narrow.shape
+    assert np.any(wide != narrow)
