@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 import copy
 import functools
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,17 +20,23 @@ from drake_affetto.experiments.trials import (
     trial_seed,
 )
 from drake_affetto.runner.executor import TrialExecutor
-from drake_affetto.skill.elm import ElmRegressor
-from drake_affetto.skill.mappings import Mapping
-from drake_affetto.skill.schemes import make_scheme
 from drake_affetto.station.scenario import SkillConfig, load_scenario
+
+if TYPE_CHECKING:
+    from drake_affetto.skill.elm import ElmRegressor
+    from drake_affetto.skill.mappings import Mapping
+
+# scikit-learn is imported where it is used: the first trials need not wait for
+# it.
 
 # The least that a skill can be learned from.
 _FEWEST = 3
 
 
-def make_skill(config: SkillConfig, seed: int) -> ElmRegressor:
+def make_skill(config: SkillConfig, seed: int) -> "ElmRegressor":
     """An untrained parameterized skill (paper Eqs. 3 and 4)."""
+    from drake_affetto.skill.elm import ElmRegressor
+
     return ElmRegressor(
         n_hidden=config.n_hidden,
         alpha=config.alpha,
@@ -51,7 +57,7 @@ def learn_skill(
     config: SkillConfig,
     demonstrations: Sequence[DemonstrationResult],
     seed: int,
-) -> ElmRegressor:
+) -> "ElmRegressor":
     """The skill after all demonstrations (paper Eqs. 3 and 4).
 
     Args:
@@ -74,7 +80,7 @@ def skills_by_count(
     config: SkillConfig,
     demonstrations: Sequence[DemonstrationResult],
     seed: int,
-) -> list[ElmRegressor]:
+) -> "list[ElmRegressor]":
     """The skill after each of the demonstrations, in order."""
     skill = make_skill(config, seed)
     skills = []
@@ -189,7 +195,7 @@ def look_at_positions(
 
 def fit_scheme(
     name: str,
-    source: ElmRegressor,
+    source: "ElmRegressor",
     tau: np.ndarray,
     theta: np.ndarray,
     scenario: str,
@@ -209,6 +215,8 @@ def fit_scheme(
     Raises:
         ValueError: for another name.
     """
+    from drake_affetto.skill.schemes import make_scheme
+
     loaded = load_scenario(scenario)
     scheme = make_scheme(name, source, input_range=loaded.skill.input_range)
     if name == "transfer_default":
@@ -220,7 +228,7 @@ def fit_scheme(
 
 
 @functools.cache
-def _mapping(scenario: str, name: str) -> str | Mapping:
+def _mapping(scenario: str, name: str) -> "str | Mapping":
     """The family of maps that a scenario names."""
     if name != "optical":
         return name

@@ -11,7 +11,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from drake_affetto.runner.progress import make_progress
 from drake_affetto.runner.store import TrialStore, trial_key
 from drake_affetto.runner.workers import WorkerPool
 
@@ -46,6 +45,9 @@ class TrialExecutor:
                 `executor`. The pool is left open.
             quiet: Whether there is no progress display.
         """
+        # Here, for workers know this module and draw nothing.
+        from drake_affetto.runner.progress import make_progress
+
         self._run = run
         self._store = store
         self._owned = pool is None

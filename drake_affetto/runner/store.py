@@ -13,7 +13,6 @@ from pathlib import Path
 import sqlite3
 from typing import Any
 
-import joblib
 import numpy as np
 
 from drake_affetto.common.errors import InputError
@@ -48,6 +47,8 @@ def _key_values(value: Any) -> Any:
         if value is None or isinstance(value, (str, int, float, bool)):
             return value
         # Arrays, estimators: the digest of their content.
+        import joblib
+
         return f"{type(value).__name__}:{joblib.hash(value)}"
 
     return map_leaves(value, leaf)

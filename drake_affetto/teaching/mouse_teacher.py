@@ -20,7 +20,6 @@ from pydrake.systems.framework import (
     OutputPort,
     System,
 )
-from pydrake.visualization import ApplyVisualizationConfig, VisualizationConfig
 
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.typing import Array
@@ -32,6 +31,8 @@ _STIFFNESS = "mouse_interaction_stiffness"
 
 def require_mouse_spring() -> None:
     """Raises InputError on a Drake that has no mouse spring."""
+    from pydrake.visualization import VisualizationConfig
+
     if not any(f.name == _STIFFNESS for f in VisualizationConfig.__fields__):
         raise InputError(
             "teaching by mouse needs a Drake whose Meshcat has a mouse spring "
@@ -162,6 +163,12 @@ class MouseTeacher(LeafSystem):
         Raises:
             InputError: If this version of Drake has no mouse spring.
         """
+        # It imports Matplotlib, and every station imports this module.
+        from pydrake.visualization import (
+            ApplyVisualizationConfig,
+            VisualizationConfig,
+        )
+
         require_mouse_spring()
         hand = plant.GetFrameByName(palm_frame).body()
         visualization = VisualizationConfig(
