@@ -255,3 +255,93 @@ def test_no_file_names_a_machine_or_a_package_host():
             if FOREIGN.search(line):
                 found.append(f"{name}:{number}: {line.strip()[:100]}")
     assert found == []
+
+
+# --- Sizes, and the language of the code ------------------------------------
+
+# Longer ones need a reason: "Long: ..." in the docstring of the module or of
+# the function; compiled kernels are long for speed.
+LONGEST_MODULE = 600
+LONGEST_BODY = 80
+
+
+def gives_a_reason(node: ast.AST) -> bool:
+    return "Long: " in (ast.get_docstring(node) or "")
+
+
+@pytest.mark.parametrize("path", MODULES, ids=module_name)
+def test_modules_are_short_or_say_why_not(path):
+    text = path.read_text()
+    length = len(text.splitlines())
+    assert length <= LONGEST_MODULE or gives_a_reason(ast.parse(text)), length
+
+
+def body_length(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    """Lines of a function without its signature and docstring."""
+    body = function.body
+    if ast.get_docstring(function) is not None:
+        body = body[1:]
+    if not body:
+        return 0
+    assert function.end_lineno is not None
+    return function.end_lineno - body[0].lineno + 1
+
+
+@pytest.mark.parametrize("path", MODULES, ids=module_name)
+def test_functions_are_short_or_compiled_or_say_why_not(path):
+    long = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            continue
+        compiled = any("njit" in ast.unparse(d) for d in node.decorator_list)
+        excused = compiled or gives_a_reason(node)
+        if body_length(node) > LONGEST_BODY and not excused:
+            long.append(f"{node.name}: {body_length(node)} lines")
+    assert long == []
+
+
+def test_there_is_one_alias_for_arrays():
+    homes = [
+        path.relative_to(PACKAGE).as_posix()
+        for path in MODULES
+        if re.search(r"(?m)^\w*Array = ", path.read_text())
+    ]
+    assert homes == ["common/typing.py"]
+
+
+# Drake's spelling is American. The scenario's value `centre` is older.
+BRITISH = re.compile(
+    r"(?<![a-z])(?:centr(?:e|es|ed|ing)|colou?r(?<=our)\w*|grey|"
+    r"neighbour\w*|behaviour\w*|favour\w*|metres?|centimetres?|labelled|"
+    r"modelled|(?:normal|synthes|initial|minim|optim|organ|recogn|summar|"
+    r"parameter|linear|discret|random|standard|visual|serial|quant)is"
+    r"(?:e|es|ed|er|ing|ation)|analys(?:e|ed)|licence)(?![a-z])",
+    re.IGNORECASE,
+)
+OLD_VALUES = re.compile(r"""["'`]centre["'`]|mode: centre|n_labelled""")
+
+
+@pytest.mark.parametrize(
+    ("text", "is_british"),
+    [
+        ("the colour of", True),
+        ("normalised", True),
+        ("_centre_of", True),
+        ("color, center and normalize", False),
+        ("precise analysis of parameters", False),
+    ],
+)
+def test_search_for_spelling_finds_what_it_should(text, is_british):
+    assert bool(BRITISH.search(text)) == is_british
+
+
+def test_spelling_is_american():
+    found = []
+    for folder in ("drake_affetto", "analysis", "tools"):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            lines = path.read_text().splitlines()
+            for number, line in enumerate(lines, start=1):
+                if BRITISH.search(OLD_VALUES.sub("", line)):
+                    place = path.relative_to(ROOT).as_posix()
+                    found.append(f"{place}:{number}: {line.strip()[:70]}")
+    assert found == []

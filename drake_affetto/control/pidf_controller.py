@@ -94,7 +94,7 @@ class PidfController(LeafSystem):
         Raises:
             InputError: for arguments that do not fit.
         """
-        LeafSystem.__init__(self)
+        super().__init__()
         PidfConfig(period=period).check("PidfController")
         require_range("integral_limit", integral_limit, 0.0)
         require_range("difference_limit", difference_limit, 0.0)

@@ -4,34 +4,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from pydrake.geometry import Cylinder, Role, SceneGraphInspector
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
-from drake_affetto.common.errors import InputError
 from drake_affetto.perception.blob import BlobCalibration, calibrate
 from drake_affetto.perception.camera_model import CameraModel, Mirror
 from drake_affetto.perception.config import CameraConfig
 from drake_affetto.perception.mirror_camera import MirrorCamera, find_frame
 from drake_affetto.scene import world
-
-
-def marker_radius(
-    plant: MultibodyPlant, inspector: SceneGraphInspector
-) -> float:
-    """Radius [m] of the drum's marker, from its visual geometry.
-
-    Raises:
-        InputError: if the drum has no visual cylinder named `marker`.
-    """
-    body = find_frame(plant, "drum::marker").body()
-    frame = plant.GetBodyFrameIdOrThrow(body.index())
-    for geometry in inspector.GetGeometries(frame, Role.kPerception):
-        shape = inspector.GetShape(geometry)
-        name = inspector.GetName(geometry).rpartition("::")[2]
-        if name == "marker" and isinstance(shape, Cylinder):
-            return float(shape.radius())
-    raise InputError("the drum's model has no visual cylinder named 'marker'")
 
 
 def make_camera_model(
@@ -57,7 +37,7 @@ def make_camera_model(
         yaw_joint,
         world.get_posture(plant, context),
         float(world.marker_position(plant, context)[2]),
-        marker_radius(plant, query.inspector()),
+        world.find_marker_radius(plant, query.inspector()),
         config.X_FC(),
     )
 

@@ -124,7 +124,7 @@ class PneumaticActuation(LeafSystem):
         Raises:
             InputError: for arguments that do not fit.
         """
-        LeafSystem.__init__(self)
+        super().__init__()
         config = PneumaticActuationConfig(
             mode=mode, time_step=time_step, look_ahead=look_ahead
         )

@@ -51,7 +51,10 @@ def _clip(x, low, high):
     "ContinuousPneumaticActuation_", T_list=[float, AutoDiffXd]
 )
 def ContinuousPneumaticActuation_(T):
-    """Makes the class for the scalar type `T`, float or AutoDiffXd."""
+    """Makes the class for the scalar type `T`, float or AutoDiffXd.
+
+    Long: Drake's templates are functions, which hold the whole class.
+    """
 
     class Impl(LeafSystem_[T]):
         """Valves and chambers of `n` joints in continuous time.

@@ -264,3 +264,36 @@ def diverging_scale() -> list[list[Any]]:
         [0.5, LIGHT["surface"]],
         [1, LIGHT["pale_plus"]],
     ]
+
+
+def difference_map(
+    z: Sequence[Sequence[float | None]],
+    x: Sequence[str],
+    y: Sequence[str],
+    text: Sequence[Sequence[str]],
+    **more: Any,
+) -> go.Heatmap:
+    """Differences of success rates as a map of colors.
+
+    Args:
+        z: Differences, percentage points; None for no cell.
+        x: Names of the columns.
+        y: Names of the rows.
+        text: Text in each cell.
+        more: Further arguments of plotly's heat map.
+    """
+    return go.Heatmap(
+        z=z,
+        x=x,
+        y=y,
+        text=text,
+        texttemplate="%{text}",
+        hoverongaps=False,
+        zmin=-100,
+        zmax=100,
+        colorscale=diverging_scale(),
+        showscale=False,
+        xgap=2,
+        ygap=2,
+        **more,
+    )

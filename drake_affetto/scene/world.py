@@ -452,10 +452,27 @@ def hand_radius(plant: MultibodyPlant, context: Context) -> float:
 
 
 def marker_radius(plant: MultibodyPlant, context: Context) -> float:
-    """Radius [m] of the colored disc on the drum's head."""
+    """Radius of the colored disc on the drum's head, m."""
+    query = plant.get_geometry_query_input_port().Eval(context)
+    return find_marker_radius(plant, query.inspector())
+
+
+def find_marker_radius(
+    plant: MultibodyPlant, inspector: SceneGraphInspector
+) -> float:
+    """Radius of the drum's marker, from its visual geometry, m.
+
+    Raises:
+        InputError: If the drum has no visual cylinder named `marker`.
+    """
     body = plant.GetFrameByName("marker").body()
-    shapes = _shapes(plant, context, body, Cylinder, Role.kPerception, "marker")
-    return shapes[0][1].radius()
+    frame = plant.GetBodyFrameIdOrThrow(body.index())
+    for geometry in inspector.GetGeometries(frame, Role.kPerception):
+        shape = inspector.GetShape(geometry)
+        name = inspector.GetName(geometry).rpartition("::")[2]
+        if name == "marker" and isinstance(shape, Cylinder):
+            return float(shape.radius())
+    raise InputError("the drum's model has no visual cylinder named 'marker'")
 
 
 def mirror_size(plant: MultibodyPlant, context: Context) -> np.ndarray:

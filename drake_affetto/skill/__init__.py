@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from drake_affetto.skill.residuals import loo_covariance
     from drake_affetto.skill.scheme_names import SCHEMES
     from drake_affetto.skill.schemes import FineTuned, NoTransfer, make_scheme
-    from drake_affetto.skill.transfer import Start, TransferRegressor
+    from drake_affetto.skill.transfer import Restart, TransferRegressor
 
 __getattr__, __dir__, __all__ = attach(
     __name__,
@@ -27,7 +27,7 @@ __getattr__, __dir__, __all__ = attach(
         "Similarity": "mappings",
         "SkillPolicy": "policy",
         "SkillPolicyConfig": "policy",
-        "Start": "transfer",
+        "Restart": "transfer",
         "TransferRegressor": "transfer",
         "input_jacobian": "adapters",
         "loo_covariance": "residuals",

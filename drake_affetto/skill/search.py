@@ -203,7 +203,7 @@ class Objective:
         return residual, change
 
 
-class Minima(NamedTuple):
+class LocalMinima(NamedTuple):
     parameters: Array  # (S, P)
     cost: Array  # (S,)
     gradient: Array  # (S, P), half of it
@@ -218,7 +218,7 @@ def levenberg_marquardt(
     *,
     max_iter: int,
     tol: float,
-) -> Minima:
+) -> LocalMinima:
     """Minimizes from all starts (S, P) at once.
 
     Each start has its own damping, after Nielsen; those that have converged
@@ -235,7 +235,7 @@ def levenberg_marquardt(
 
 def _descend(
     objective: Evaluate, starts: Array, max_iter: int, tol: float
-) -> Minima:
+) -> LocalMinima:
     """`levenberg_marquardt` without the last step."""
     parameters = np.array(starts, dtype=float)
     cost, gradient, curvature = objective(parameters)
@@ -278,7 +278,9 @@ def _descend(
         damping[index] = np.maximum(damping[index], 1e-12)
         growth[index] = np.where(better, 2.0, 2.0 * growth[index])
         converged[index] = small
-    return Minima(parameters, cost, gradient, curvature, converged, iterations)
+    return LocalMinima(
+        parameters, cost, gradient, curvature, converged, iterations
+    )
 
 
 def bfgs(
@@ -287,7 +289,7 @@ def bfgs(
     *,
     max_iter: int,
     tol: float,
-) -> Minima:
+) -> LocalMinima:
     """Minimizes from one start after another by BFGS, as in the paper."""
 
     def cost_and_gradient(p: Array) -> tuple[float, Array]:
@@ -309,6 +311,6 @@ def bfgs(
         converged.append(found.nit < max_iter)
         iterations = max(iterations, int(found.nit))
     parameters = np.array(ends)
-    return Minima(
+    return LocalMinima(
         parameters, *objective(parameters), np.array(converged), iterations
     )

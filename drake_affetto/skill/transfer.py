@@ -57,7 +57,7 @@ from drake_affetto.skill.residuals import (
     whitening,
 )
 from drake_affetto.skill.search import (
-    Minima,
+    LocalMinima,
     Objective,
     Prior,
     bfgs,
@@ -78,7 +78,7 @@ _PLAIN_ALPHA = 0.03
 _PRIORS = ("auto", "domain", "similar", "moments")
 
 
-class Start(NamedTuple):
+class Restart(NamedTuple):
     """Where a search began, and what became of it.
 
     Attributes:
@@ -151,7 +151,7 @@ class TransferRegressor(
             similarities.
         cost_: of the best minimum.
         gradient_norm_: of the cost, there.
-        starts_: list of `Start`, in the order they were tried in.
+        starts_: list of `Restart`, in the order they were tried in.
         winner_: the index of the best among them: that of least cost.
         residual_: the fitted residual, or None.
         n_iter_: iterations of the longest search.
@@ -439,7 +439,7 @@ class TransferRegressor(
     def _report(
         self,
         named: list[tuple[str, Array]],
-        minima: Minima,
+        minima: LocalMinima,
         repeated: NDArray[np.bool_],
         rest: float,
         noise: float,
@@ -456,7 +456,7 @@ class TransferRegressor(
         weights /= weights.sum()
         norms = 2.0 * np.linalg.norm(minima.gradient, axis=1)
         self.starts_ = [
-            Start(name, initial, *found)
+            Restart(name, initial, *found)
             for (name, initial), *found in zip(
                 named,
                 minima.parameters,

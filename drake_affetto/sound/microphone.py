@@ -77,7 +77,7 @@ class DrumMicrophone(LeafSystem):
         Raises:
             InputError: if one body is given two parts.
         """
-        LeafSystem.__init__(self)
+        super().__init__()
         shell_indices = frozenset(int(body) for body in shell)
         table_indices = frozenset(int(body) for body in table)
         self._head = int(head)

@@ -36,7 +36,6 @@ from drake_affetto.perception.blob_sensor import BlobSensor
 from drake_affetto.perception.gaze import GazeMode, GazeTask
 from drake_affetto.perception.gaze_servo import GazeServo, gaze_view
 from drake_affetto.perception.mirror_camera import MirrorCamera
-from drake_affetto.perception.plant_camera_model import marker_radius
 from drake_affetto.pneumatics.actuation import PneumaticActuation
 from drake_affetto.scene import world
 from drake_affetto.skill.policy import SkillPolicy
@@ -403,7 +402,9 @@ class AffettoStation(Diagram):
                 query_object=seen.get_query_output_port(),
                 camera=self.camera,
                 config=self.scenario.blob,
-                radius=marker_radius(self.plant, seen.model_inspector()),
+                radius=world.find_marker_radius(
+                    self.plant, seen.model_inspector()
+                ),
             )
         else:
             self.blob_sensor = BlobSensor.AddToBuilder(

@@ -13,7 +13,7 @@ from drake_affetto.report.comparison import SchemeComparison
 from drake_affetto.report.style import (
     LIGHT,
     Chart,
-    diverging_scale,
+    difference_map,
     escaped,
     make_figure,
     percent_axis,
@@ -263,27 +263,14 @@ def advantage(
         return None
     figure = make_figure(
         [
-            go.Heatmap(
-                z=z,
-                x=[str(n) for n in samples],
-                y=[
-                    f"{escaped(factor)}:<br>{escaped(v)}"
-                    for factor, v in places
-                ],
-                text=[
-                    ["" if v is None else signed(v) for v in row] for row in z
-                ],
-                texttemplate="%{text}",
+            difference_map(
+                z,
+                [str(n) for n in samples],
+                [f"{escaped(factor)}:<br>{escaped(v)}" for factor, v in places],
+                [["" if v is None else signed(v) for v in row] for row in z],
                 textfont={"color": LIGHT["ink"]},
                 hovertemplate="%{y}, %{x} demonstrations: %{z:+.0f} points"
                 "<extra></extra>",
-                hoverongaps=False,
-                zmin=-100,
-                zmax=100,
-                colorscale=diverging_scale(),
-                showscale=False,
-                xgap=2,
-                ygap=2,
             )
         ],
         x={

@@ -62,44 +62,7 @@ def learning_curve(
     traces: list[Any] = []
     rows = []
     for key, label, dash, curve in curves:
-        n = [point.n for point in curve]
-        mean, low, high = (
-            [100.0 * getattr(point.success_rate, kind) for point in curve]
-            for kind in ("mean", "low", "high")
-        )
-        traces.append(
-            go.Scatter(
-                x=n + n[::-1],
-                y=high + low[::-1],
-                fill="toself",
-                fillcolor=LIGHT[key],
-                mode="none",
-                opacity=0.18,
-                hoverinfo="skip",
-                showlegend=False,
-                legendgroup=key,
-            )
-        )
-        traces.append(
-            go.Scatter(
-                x=n,
-                y=mean,
-                customdata=list(zip(low, high, strict=True)),
-                name=label,
-                legendgroup=key,
-                mode="lines+markers",
-                line={"color": LIGHT[key], "width": 2.5, "dash": dash},
-                marker={
-                    "size": 6,
-                    "symbol": "circle" if key == "random" else "diamond",
-                },
-                hovertemplate=(
-                    "%{x} demonstrations: %{y:.0f} %"
-                    " (%{customdata[0]:.0f} to %{customdata[1]:.0f})"
-                    "<extra></extra>"
-                ),
-            )
-        )
+        traces += _curve(key, label, dash, curve)
         rows += [
             [label, point.n, wording.rate(point.success_rate)]
             for point in curve
@@ -160,6 +123,47 @@ def learning_curve(
         rows,
         420,
     )
+
+
+def _curve(
+    key: str, label: str, dash: str, curve: Sequence[CurvePoint]
+) -> list[Any]:
+    """A band of confidence, and the curve of the means."""
+    n = [point.n for point in curve]
+    mean, low, high = (
+        [100.0 * getattr(point.success_rate, kind) for point in curve]
+        for kind in ("mean", "low", "high")
+    )
+    band = go.Scatter(
+        x=n + n[::-1],
+        y=high + low[::-1],
+        fill="toself",
+        fillcolor=LIGHT[key],
+        mode="none",
+        opacity=0.18,
+        hoverinfo="skip",
+        showlegend=False,
+        legendgroup=key,
+    )
+    line = go.Scatter(
+        x=n,
+        y=mean,
+        customdata=list(zip(low, high, strict=True)),
+        name=label,
+        legendgroup=key,
+        mode="lines+markers",
+        line={"color": LIGHT[key], "width": 2.5, "dash": dash},
+        marker={
+            "size": 6,
+            "symbol": "circle" if key == "random" else "diamond",
+        },
+        hovertemplate=(
+            "%{x} demonstrations: %{y:.0f} %"
+            " (%{customdata[0]:.0f} to %{customdata[1]:.0f})"
+            "<extra></extra>"
+        ),
+    )
+    return [band, line]
 
 
 def similarity(
@@ -310,48 +314,10 @@ def _taught_and_tested(
             hovertemplate=f"taught at {where}<extra></extra>",
         )
     ]
-    for success, label, symbol in (
-        (True, "tested: hit", "circle"),
-        (False, "tested: miss", "x"),
-    ):
+    for success in (True, False):
         rows = [row for row in tests if row.success is success]
-        if not rows:
-            continue
-        edge = {"width": 1.2, "color": LIGHT["ink"]}
-        rewards = [row.reward for row in rows]
-        traces.append(
-            go.Scatter(
-                points(rows),
-                name=label,
-                mode="markers",
-                marker={
-                    "symbol": symbol,
-                    "size": 13,
-                    "color": rewards,
-                    "coloraxis": "coloraxis",
-                    "line": edge,
-                },
-                showlegend=False,
-                customdata=rewards,
-                hovertemplate=f"reward %{{customdata:.2f}} at {where}"
-                f"<extra>{label}</extra>",
-            )
-        )
-        # In the legend with one color: there the markers have no reward.
-        traces.append(
-            go.Scatter(
-                x=[None],
-                y=[None],
-                name=label,
-                mode="markers",
-                marker={
-                    "symbol": symbol,
-                    "size": 11,
-                    "color": LIGHT["mid_reward"],
-                    "line": edge,
-                },
-            )
-        )
+        if rows:
+            traces += _tested(points(rows), rows, success, where)
     figure = make_figure(
         traces,
         x=x,
@@ -393,6 +359,50 @@ def _taught_and_tested(
         ],
         420,
     )
+
+
+def _tested(
+    points: dict[str, list[float]],
+    rows: Sequence[TestedRow],
+    success: bool,
+    where: str,
+) -> list[Any]:
+    """Trials that all hit or all missed, and their entry in the legend."""
+    label, symbol = (
+        ("tested: hit", "circle") if success else ("tested: miss", "x")
+    )
+    edge = {"width": 1.2, "color": LIGHT["ink"]}
+    rewards = [row.reward for row in rows]
+    trials = go.Scatter(
+        points,
+        name=label,
+        mode="markers",
+        marker={
+            "symbol": symbol,
+            "size": 13,
+            "color": rewards,
+            "coloraxis": "coloraxis",
+            "line": edge,
+        },
+        showlegend=False,
+        customdata=rewards,
+        hovertemplate=f"reward %{{customdata:.2f}} at {where}"
+        f"<extra>{label}</extra>",
+    )
+    # In the legend with one color: there the markers have no reward.
+    legend = go.Scatter(
+        x=[None],
+        y=[None],
+        name=label,
+        mode="markers",
+        marker={
+            "symbol": symbol,
+            "size": 11,
+            "color": LIGHT["mid_reward"],
+            "line": edge,
+        },
+    )
+    return [trials, legend]
 
 
 def separation(

@@ -1,11 +1,13 @@
 """The chart of the toy experiment (paper Fig. 2)."""
 
 import math
+from typing import Any
 
 import plotly.graph_objects as go
 
 from drake_affetto.experiments.results import (
     ToyFigures,
+    ToyMethod,
     ToyResults,
 )
 from drake_affetto.report.style import (
@@ -18,30 +20,11 @@ from drake_affetto.report.style import (
     wrapped,
 )
 
+_Method = tuple[str, str, ToyMethod]
 
-def toy_errors(
-    figures: ToyFigures | ToyResults,
-    labels: dict[str, dict[str, str]],
-    *,
-    key: str,
-    square: str,
-    paper: float | None,
-) -> Chart:
-    """Fig. 2: errors on the points not given, by method; a dot for a seed.
 
-    Args:
-        figures: of one square in the toy's results.
-        labels: by group ("transfer", "baselines") and method, what it is
-            called; others keep their name.
-        key: of the chart.
-        square: what the square is called.
-        paper: the paper's figure, to be drawn as a line.
-    """
-    methods = [
-        (group, labels.get(group, {}).get(name, name), row)
-        for group in ("transfer", "baselines")
-        for name, row in getattr(figures, group).items()
-    ]
+def _seeds(methods: list[_Method]) -> list[Any]:
+    """A pale dot for each seed of each method."""
     traces = []
     for i, (group, label, row) in enumerate(methods):
         color = LIGHT["random" if group == "transfer" else "active"]
@@ -62,6 +45,12 @@ def toy_errors(
                 "</extra>",
             )
         )
+    return traces
+
+
+def _medians(methods: list[_Method]) -> list[Any]:
+    """The median of each method, over its seeds."""
+    traces = []
     for kind, title, color, symbol in (
         ("transfer", "transfer", "random", "circle"),
         ("baselines", "without transfer", "active", "square"),
@@ -87,6 +76,33 @@ def toy_errors(
                 hovertemplate="%{customdata}: median %{x:.3g}<extra></extra>",
             )
         )
+    return traces
+
+
+def toy_errors(
+    figures: ToyFigures | ToyResults,
+    labels: dict[str, dict[str, str]],
+    *,
+    key: str,
+    square: str,
+    paper: float | None,
+) -> Chart:
+    """Fig. 2: errors on the points not given, by method; a dot for a seed.
+
+    Args:
+        figures: of one square in the toy's results.
+        labels: by group ("transfer", "baselines") and method, what it is
+            called; others keep their name.
+        key: of the chart.
+        square: what the square is called.
+        paper: the paper's figure, to be drawn as a line.
+    """
+    methods = [
+        (group, labels.get(group, {}).get(name, name), row)
+        for group in ("transfer", "baselines")
+        for name, row in getattr(figures, group).items()
+    ]
+    traces = [*_seeds(methods), *_medians(methods)]
     lines = (
         [
             reference_line(

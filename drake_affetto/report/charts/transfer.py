@@ -10,11 +10,11 @@ from drake_affetto.experiments.results import (
     TransferMap,
 )
 from drake_affetto.report import wording
-from drake_affetto.report.comparison import SchemeComparison
+from drake_affetto.report.comparison import Comparison, SchemeComparison
 from drake_affetto.report.style import (
     LIGHT,
     Chart,
-    diverging_scale,
+    difference_map,
     escaped,
     make_figure,
     percent_axis,
@@ -38,44 +38,7 @@ def success_by_scheme(comparison: SchemeComparison) -> Chart:
         for name in names
     ]
     several = len(comparison.samples) > 1
-    traces: list[Any] = []
-    # Along the axis: a place for each number of samples, or for each scheme.
-    width = 0.86 / len(names)
-    for k, name in enumerate(names):
-        found = [comparison.rates[name][n] for n in comparison.samples]
-        shift = (k - 0.5 * (len(names) - 1)) * width
-        place = [i + shift for i in range(len(found))] if several else [k]
-        mean = [100 * r.mean for r in found]
-        along, across = ("x", "y") if several else ("y", "x")
-        error = whiskers(found) | {"color": LIGHT["ink"], "thickness": 1.4}
-        # The bar is pale, so that the whisker is seen on it in any theme.
-        traces.append(
-            go.Bar(
-                {along: place, across: mean},
-                orientation="v" if several else "h",
-                width=0.9 * width if several else 0.62,
-                marker={"color": scheme_color(name)},
-                opacity=0.4,
-                hoverinfo="skip",
-                showlegend=False,
-                legendgroup=name,
-            )
-        )
-        traces.append(
-            go.Scatter(
-                {along: place, across: mean, f"error_{across}": error},
-                name=escaped(wording.scheme(name)),
-                mode="markers",
-                marker=scheme_marker(name),
-                customdata=[[100 * r.low, 100 * r.high] for r in found],
-                hovertemplate=f"%{{{across}:.0f}} % (%{{customdata[0]:.0f}} "
-                "to %{customdata[1]:.0f})<extra>"
-                + escaped(wording.scheme(name))
-                + "</extra>",
-                showlegend=several,
-                legendgroup=name,
-            )
-        )
+    traces = _bars(comparison, names)
     if several:
         figure = make_figure(
             traces,
@@ -126,6 +89,50 @@ def success_by_scheme(comparison: SchemeComparison) -> Chart:
         420 if several else 60 + 52 * len(names),
         wide=several,
     )
+
+
+def _bars(comparison: SchemeComparison, names: list[str]) -> list[Any]:
+    """Pale bars with markers and whiskers, a color for each scheme."""
+    several = len(comparison.samples) > 1
+    traces: list[Any] = []
+    # Along the axis: a place for each number of samples, or for each scheme.
+    width = 0.86 / len(names)
+    for k, name in enumerate(names):
+        found = [comparison.rates[name][n] for n in comparison.samples]
+        shift = (k - 0.5 * (len(names) - 1)) * width
+        place = [i + shift for i in range(len(found))] if several else [k]
+        mean = [100 * r.mean for r in found]
+        along, across = ("x", "y") if several else ("y", "x")
+        error = whiskers(found) | {"color": LIGHT["ink"], "thickness": 1.4}
+        # The bar is pale, so that the whisker is seen on it in any theme.
+        traces.append(
+            go.Bar(
+                {along: place, across: mean},
+                orientation="v" if several else "h",
+                width=0.9 * width if several else 0.62,
+                marker={"color": scheme_color(name)},
+                opacity=0.4,
+                hoverinfo="skip",
+                showlegend=False,
+                legendgroup=name,
+            )
+        )
+        traces.append(
+            go.Scatter(
+                {along: place, across: mean, f"error_{across}": error},
+                name=escaped(wording.scheme(name)),
+                mode="markers",
+                marker=scheme_marker(name),
+                customdata=[[100 * r.low, 100 * r.high] for r in found],
+                hovertemplate=f"%{{{across}:.0f}} % (%{{customdata[0]:.0f}} "
+                "to %{customdata[1]:.0f})<extra>"
+                + escaped(wording.scheme(name))
+                + "</extra>",
+                showlegend=several,
+                legendgroup=name,
+            )
+        )
+    return traces
 
 
 def rewards_by_scheme(comparison: SchemeComparison) -> Chart | None:
@@ -232,47 +239,20 @@ def significance(comparison: SchemeComparison, samples: int) -> Chart:
             shown[-1].append(
                 signed(100 * found.difference) + ("*" if found.clear else "")
             )
-            effect = (
-                ""
-                if found.effect_size is None
-                else f"<br>effect size (Cohen's h) {found.effect_size:+.2f}"
-            )
-            hovers[-1].append(
-                f"{escaped(wording.scheme(a))} − {escaped(wording.scheme(b))}: "
-                f"{wording.points(found.difference)}"
-                f"<br>corrected {wording.p_value(found.p)}{effect}"
-            )
+            pair = f"{wording.scheme(a)} − {wording.scheme(b)}"
+            hovers[-1].append(_hover(pair, found))
             if i < j:
-                rows.append(
-                    [
-                        f"{wording.scheme(a)} − {wording.scheme(b)}",
-                        wording.points(found.difference),
-                        wording.p_value(found.p_single),
-                        wording.p_value(found.p),
-                        "–"
-                        if found.effect_size is None
-                        else f"{found.effect_size:+.2f}",
-                        "yes" if found.clear else "no",
-                    ]
-                )
+                rows.append(_pair_row(pair, found))
     figure = make_figure(
         [
-            go.Heatmap(
-                z=values,
-                x=labels,
-                y=labels,
-                text=shown,
+            difference_map(
+                values,
+                labels,
+                labels,
+                shown,
                 customdata=hovers,
-                texttemplate="%{text}",
                 textfont={"size": 11, "color": LIGHT["ink"]},
                 hovertemplate="%{customdata}<extra></extra>",
-                hoverongaps=False,
-                zmin=-100,
-                zmax=100,
-                colorscale=diverging_scale(),
-                showscale=False,
-                xgap=2,
-                ygap=2,
             )
         ],
         x={"side": "bottom", "tickangle": -90, "showgrid": False},
@@ -302,6 +282,30 @@ def significance(comparison: SchemeComparison, samples: int) -> Chart:
     )
 
 
+def _hover(pair: str, found: Comparison) -> str:
+    """What a cell shows when it is touched."""
+    text = (
+        f"{escaped(pair)}: {wording.points(found.difference)}"
+        f"<br>corrected {wording.p_value(found.p)}"
+    )
+    if found.effect_size is not None:
+        text += f"<br>effect size (Cohen's h) {found.effect_size:+.2f}"
+    return text
+
+
+def _pair_row(pair: str, found: Comparison) -> list[str]:
+    """The same pair's row in the table."""
+    effect = found.effect_size
+    return [
+        pair,
+        wording.points(found.difference),
+        wording.p_value(found.p_single),
+        wording.p_value(found.p),
+        "–" if effect is None else f"{effect:+.2f}",
+        "yes" if found.clear else "no",
+    ]
+
+
 def transfer_map(grid: TransferMap) -> list[Chart]:
     """The map h: a grid of what is seen now, and where h puts it."""
     n_rows, n_columns = grid.shape
@@ -329,59 +333,12 @@ def transfer_map(grid: TransferMap) -> list[Chart]:
         names = getattr(grid, f"{part}_names")
         # As in images.
         downwards = names[1].startswith("y_img")
-        traces: list[Any] = []
-        for lines, key, label in (
-            (net, "plus", "first direction"),
-            (net.transpose(1, 0, 2), "minus", "second direction"),
-        ):
-            joined = np.concatenate(
-                [np.vstack([line, [[np.nan, np.nan]]]) for line in lines]
-            )
-            traces.append(
-                go.Scatter(
-                    x=_gaps(joined[:, 0]),
-                    y=_gaps(joined[:, 1]),
-                    mode="lines",
-                    name=label,
-                    line={
-                        "color": LIGHT[key],
-                        "width": 1.4,
-                        "dash": "solid" if key == "plus" else "dot",
-                    },
-                    hoverinfo="skip",
-                    showlegend=False,
-                )
-            )
         corners = [net[0, 0], net[0, -1], net[-1, -1], net[-1, 0]]
-        traces.append(
-            go.Scatter(
-                x=[float(c[0]) for c in corners],
-                y=[float(c[1]) for c in corners],
-                mode="markers+text",
-                text=["A", "B", "C", "D"],
-                textposition=_outward(corners, downwards),
-                textfont={"size": 14, "color": LIGHT["ink"]},
-                marker={"size": 7, "color": LIGHT["ink"]},
-                cliponaxis=False,
-                showlegend=False,
-                hovertemplate="corner %{text}: %{x:.2f}, %{y:.2f}"
-                "<extra></extra>",
-            )
-        )
-        traces.append(
-            go.Scatter(
-                x=taught[:, 0].tolist(),
-                y=taught[:, 1].tolist(),
-                mode="markers+text",
-                text=[str(i + 1) for i in range(len(taught))],
-                textposition="middle center",
-                textfont={"size": 11, "color": LIGHT["surface"]},
-                marker={"size": 19, "color": LIGHT["paper"]},
-                showlegend=False,
-                hovertemplate="demonstration %{text}: %{x:.2f}, %{y:.2f}"
-                "<extra></extra>",
-            )
-        )
+        traces = [
+            *_net_lines(net),
+            _corners(corners, downwards),
+            _numbered(taught),
+        ]
         figure = make_figure(
             traces,
             x={"title": {"text": escaped(names[0])}, "showgrid": False},
@@ -414,6 +371,66 @@ def transfer_map(grid: TransferMap) -> list[Chart]:
             )
         )
     return charts
+
+
+def _net_lines(net: np.ndarray) -> list[Any]:
+    """The lines of a grid (rows, columns, 2) in both directions."""
+    traces: list[Any] = []
+    for lines, key, label in (
+        (net, "plus", "first direction"),
+        (net.transpose(1, 0, 2), "minus", "second direction"),
+    ):
+        joined = np.concatenate(
+            [np.vstack([line, [[np.nan, np.nan]]]) for line in lines]
+        )
+        traces.append(
+            go.Scatter(
+                x=_gaps(joined[:, 0]),
+                y=_gaps(joined[:, 1]),
+                mode="lines",
+                name=label,
+                line={
+                    "color": LIGHT[key],
+                    "width": 1.4,
+                    "dash": "solid" if key == "plus" else "dot",
+                },
+                hoverinfo="skip",
+                showlegend=False,
+            )
+        )
+    return traces
+
+
+def _corners(corners: list[np.ndarray], downwards: bool) -> go.Scatter:
+    """The grid's corners, A to D."""
+    return go.Scatter(
+        x=[float(c[0]) for c in corners],
+        y=[float(c[1]) for c in corners],
+        mode="markers+text",
+        text=["A", "B", "C", "D"],
+        textposition=_outward(corners, downwards),
+        textfont={"size": 14, "color": LIGHT["ink"]},
+        marker={"size": 7, "color": LIGHT["ink"]},
+        cliponaxis=False,
+        showlegend=False,
+        hovertemplate="corner %{text}: %{x:.2f}, %{y:.2f}<extra></extra>",
+    )
+
+
+def _numbered(taught: np.ndarray) -> go.Scatter:
+    """The demonstrations (k, 2), with their numbers."""
+    return go.Scatter(
+        x=taught[:, 0].tolist(),
+        y=taught[:, 1].tolist(),
+        mode="markers+text",
+        text=[str(i + 1) for i in range(len(taught))],
+        textposition="middle center",
+        textfont={"size": 11, "color": LIGHT["surface"]},
+        marker={"size": 19, "color": LIGHT["paper"]},
+        showlegend=False,
+        hovertemplate="demonstration %{text}: %{x:.2f}, %{y:.2f}"
+        "<extra></extra>",
+    )
 
 
 def _gaps(values: np.ndarray) -> list[float | None]:
