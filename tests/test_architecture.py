@@ -174,6 +174,33 @@ def test_runner_knows_no_robot():
             assert {place(other) for other in others} <= {"runner", "common"}
 
 
+def test_picture_of_the_rooms_shows_the_imports():
+    source = (ROOT / "docs/rooms.dot").read_text()
+    drawn = set(re.findall(r"^(\w+) -> (\w+)$", source, re.MULTILINE))
+    nodes = set(re.findall(r"^(\w+) \[fillcolor", source, re.MULTILINE))
+    imported: dict[str, set[str]] = {}
+    for module, others in import_graph().items():
+        # The modules at the top only hand on what rooms offer.
+        if (PACKAGE / place(module)).is_dir() and place(module):
+            imported.setdefault(place(module), set()).update(map(place, others))
+    imported = {
+        room: {other for other in others if other in imported} - {room}
+        for room, others in imported.items()
+    }
+    assert nodes == set(imported), "make rooms"
+    assert all(there in imported[room] for room, there in drawn), "make rooms"
+    # What is not drawn follows from what is.
+    reached = {room: {b for a, b in drawn if a == room} for room in imported}
+    for _ in imported:
+        for others in reached.values():
+            others.update(*(reached[other] for other in set(others)))
+    for room, others in imported.items():
+        assert others <= reached[room], "make rooms"
+    picture = (ROOT / "docs/rooms.svg").read_text()
+    titles = set(re.findall(r"<title>(\w+)&#45;&gt;(\w+)</title>", picture))
+    assert titles == drawn, "make rooms"
+
+
 @pytest.mark.parametrize("path", MODULES, ids=module_name)
 def test_every_module_says_what_it_is(path):
     assert ast.get_docstring(ast.parse(path.read_text()))

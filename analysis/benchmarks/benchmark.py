@@ -4,8 +4,9 @@
 
 Each benchmark is a function of a module beside this one that prints a few
 lines. Absolute times hold for this machine and this minute; the ratios say
-more. CPU time is what is measured, the least of several tries; only for the
-studies, whose workers share the work, it is the time that passes.
+more. CPU time is what is measured, the least of several tries; only for a
+study and its start, whose processes share the work, it is the time that
+passes.
 """
 
 import argparse
@@ -14,6 +15,7 @@ import importlib
 # Name → the module beside this one and its function. A benchmark is imported
 # only when it runs: the learning core needs no Drake.
 BENCHMARKS = {
+    "start": ("bench_start", "run"),
     "dmp": ("bench_learning", "dmp"),
     "elm": ("bench_learning", "elm"),
     "transfer": ("bench_learning", "transfer"),
