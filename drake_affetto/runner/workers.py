@@ -99,6 +99,13 @@ def make_executor(
     )
 
 
+def _usable_cores() -> Sequence[int]:
+    """The cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return sorted(os.sched_getaffinity(0))
+    return range(os.cpu_count() or 1)
+
+
 class WorkerPool:
     """An executor that is replaced when its processes have died."""
 
@@ -140,9 +147,16 @@ class WorkerPool:
         return self._executor
 
     def start(self) -> None:
-        """Starts the worker processes before there is anything to do."""
+        """Starts worker processes before there is anything to do.
+
+        This process needs a core too until it has planned the calls. So it
+        starts as many as there are other cores, at least one; `run` starts
+        the rest.
+        """
+        others = max(1, len(_usable_cores()) - 1)
         self.starting = [
-            self._executor.submit(_ready) for _ in range(self.workers)
+            self._executor.submit(_ready)
+            for _ in range(min(self.workers, others))
         ]
 
     def __enter__(self) -> "WorkerPool":
