@@ -32,7 +32,7 @@ DEFAULT_FILE = "package://drake_affetto/control.yaml"
 class JointGains:
     """Gains of one joint.
 
-    Args:
+    Attributes:
         kP: Pa/rad.
         kI: Pa/(rad s).
         kD: Pa s/rad.
@@ -105,7 +105,7 @@ class PidfGains:
 class ControlParameters:
     """Gains of the joints by their names, and the limits of the control.
 
-    Args:
+    Attributes:
         integral_limit: greatest part of u that the integral may ask for, Pa.
         difference_limit: greatest pressure difference u asked for, Pa.
         integral_deadband: errors up to this are not integrated, rad. An

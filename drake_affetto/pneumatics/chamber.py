@@ -140,7 +140,7 @@ DWELL_OFFSET_PER_JOINT = 7
 
 
 def memory_size(n: int, time_step: float, dead_time: float) -> int:
-    """Size of the memory vector of `n` joints for the longest dead time [s].
+    """Size of the memory vector of `n` joints for the longest dead time, s.
 
     It holds [filled, head, mass (2n), spool (2n), angle (n), velocity (n),
     bristle (n), dwell (n), line (slots x 2n)].
@@ -168,7 +168,7 @@ def opening_fraction(stroke: float, underlap: float) -> float:
 def chamber_flows(
     p, T, supply, atmosphere, T_supply, c_fill, c_out, b
 ) -> tuple[float, float, float, float]:
-    """Flow rates in and out [kg/s] and their derivatives by p [kg/(s Pa)].
+    """Flow rates in and out [kg/s] and their derivatives by p, kg/(s Pa).
 
     Each is positive along its path (supply to chamber, chamber to atmosphere)
     and negative where the pressures turn it round.

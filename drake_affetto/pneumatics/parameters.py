@@ -28,7 +28,7 @@ DEFAULT_FILE = "package://drake_affetto/pneumatics.yaml"
 class ActuatorClass:
     """One size of cylinder or vane, its two valves, lines and seals.
 
-    Args:
+    Attributes:
         torque_constant: K_a, torque per pressure in chamber a and volume per
             angle, N m/Pa = m³/rad.
         area_ratio: K_b/K_a; below 1 for the rod side of a cylinder.
@@ -115,7 +115,7 @@ _CLASS_FIELDS = tuple(f.name for f in dataclasses.fields(ActuatorClass))
 class JointActuator:
     """Which actuator class drives a joint, and where the joint differs.
 
-    Args:
+    Attributes:
         actuator: name of the class.
         override: values of `ActuatorClass` fields that hold for this joint
             alone.
@@ -129,7 +129,7 @@ class JointActuator:
 class PneumaticParameters:
     """The air supply, the actuator classes and the joints they drive.
 
-    Args:
+    Attributes:
         supply_pressure: Pa absolute.
         atmospheric_pressure: Pa absolute.
         temperature: of supply and surroundings, K.
@@ -337,7 +337,7 @@ def resting_pressure(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
 def chamber_volumes(
     parameters: NDArray[np.float64], q: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Volumes (n) of the chambers a and b [m³] at the joint angles q [rad]."""
+    """Volumes (n) of the chambers a and b [m³] at the joint angles q, rad."""
     q = np.asarray(q, dtype=float)
     volume_a = parameters[Row.V_A] + parameters[Row.K_A] * (
         q - parameters[Row.Q_LOWER]

@@ -19,15 +19,15 @@ class Hand:
     """A mass on a spring-damper arm, with a Hunt-Crossley surface."""
 
     mass: float = 0.35
-    """Mass that moves with the hand [kg]."""
+    """Mass that moves with the hand, kg."""
     arm_stiffness: float = 250.0
-    """Spring between the hand and where it is led [N/m]."""
+    """Spring between the hand and where it is led, N/m."""
     arm_damping: float = 12.0
-    """Damper between the hand and where it is led [N s/m]."""
+    """Damper between the hand and where it is led, N s/m."""
     stiffness: float = 600.0
-    """Contact stiffness [N/m]."""
+    """Contact stiffness, N/m."""
     dissipation: float = 1.5
-    """Hunt-Crossley dissipation [s/m]."""
+    """Hunt-Crossley dissipation, s/m."""
 
 
 def contact_force(
@@ -40,8 +40,8 @@ def contact_force(
     target[0]. Gravity is balanced by the arm.
 
     Args:
-        t: evenly spaced times (T) [s].
-        target: heights to which the hands are led, (T,) or (T, N) [m].
+        t: evenly spaced times (T), s.
+        target: heights to which the hands are led, (T,) or (T, N), m.
         hand: one hand for all, or one for each column.
 
     Returns:
@@ -108,14 +108,14 @@ def stroke(
     """Height of a stroke: down by a raised cosine, dwell, and up again.
 
     Args:
-        t: times (T) [s].
-        start: when it starts to fall [s].
-        height: height above the surface before and after [m].
+        t: times (T), s.
+        start: when it starts to fall, s.
+        height: height above the surface before and after, m.
         depth: how far below the surface it is led; negative: it stays above
-            by as much [m].
-        fall: duration of the way down [s].
-        dwell: time at the bottom [s].
-        rise: duration of the way up [s].
+            by as much, m.
+        fall: duration of the way down, s.
+        dwell: time at the bottom, s.
+        rise: duration of the way up, s.
     """
     times = np.asarray(t, dtype=float) - start
     down = np.clip(times / fall, 0.0, 1.0)

@@ -47,11 +47,11 @@ class DrumMicrophone(LeafSystem):
 
     Output ports:
 
-    - `contact_force` (2): force on the head along its inward normal [N],
+    - `contact_force` (2): force on the head along its inward normal, N,
       never negative, and distance of that force's center from the center of
-      the head [m]. Both zero without contact.
+      the head, m. Both zero without contact.
     - `knock_force` (2): sum of the magnitudes of the contact forces on the
-      shell [N] and on the table [N].
+      shell [N] and on the table, N.
 
     There is no state. With the plant's default of sampled output ports the
     forces are those of the plant's last step.
@@ -171,11 +171,11 @@ class DrumMicrophone(LeafSystem):
         return self._body_poses_port
 
     def get_contact_force_output_port(self) -> OutputPort:
-        """Normal force on the head [N] and its distance from the center [m]."""
+        """Normal force on the head [N] and its distance from the center, m."""
         return self._contact_force_port
 
     def get_knock_force_output_port(self) -> OutputPort:
-        """Force on the shell and force on the table [N]."""
+        """Force on the shell and force on the table, N."""
         return self._knock_force_port
 
     def _calc_contact_force(self, context: Context, output: BasicVector):

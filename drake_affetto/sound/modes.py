@@ -20,13 +20,13 @@ class Modes:
     """Damped oscillators and what they sound like, N of them."""
 
     omega: Array
-    """Undamped angular frequency (N) [rad/s]."""
+    """Undamped angular frequency (N), rad/s."""
     alpha: Array
-    """Decay rate (N) [1/s]: free motion falls as exp(-alpha t)."""
+    """Decay rate (N), 1/s: free motion falls as exp(-alpha t)."""
     mass: Array
-    """Modal mass (N) [kg]."""
+    """Modal mass (N), kg."""
     gain: Array
-    """Pressure at the microphone by modal acceleration (N) [Pa s^2/m]."""
+    """Pressure at the microphone by modal acceleration (N), Pa s^2/m."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -29,27 +29,27 @@ class RewardConfig:
     """How a recording is heard."""
 
     window: float = 0.064
-    """Length of the Hann window of a frame [s]."""
+    """Length of the Hann window of a frame, s."""
     hop: float = 0.016
-    """Time from frame to frame [s]."""
+    """Time from frame to frame, s."""
     bands: int = 20
     """Number of bands m, evenly spaced in log frequency."""
     low: float = 60.0
-    """Lower edge of the lowest band [Hz]."""
+    """Lower edge of the lowest band, Hz."""
     high: float = 800.0
-    """Upper edge of the highest band [Hz]."""
+    """Upper edge of the highest band, Hz."""
     floor: float = 1e-3
-    """Sound pressure (rms in a band) that just begins to count [Pa]."""
+    """Sound pressure (rms in a band) that just begins to count, Pa."""
     contrast: float = 1.0
     """Share of the local mean over bands that is taken off; 0: none."""
     contrast_width: float = 2.0
-    """Width of that local mean [octaves]."""
+    """Width of that local mean, octaves."""
     threshold: float = SUCCESS_THRESHOLD
     """Reward above which a trial is a success."""
     lead: float = 0.064
-    """Part of a prototype before its loudest frame [s]."""
+    """Part of a prototype before its loudest frame, s."""
     length: float = 0.4
-    """Length of a prototype [s]."""
+    """Length of a prototype, s."""
 
     def check(self, where: str) -> None:
         """Raises InputError naming the field that does not fit."""
@@ -92,12 +92,12 @@ def spectrogram(
     """What stands out of a recording: compressed band levels.
 
     From L = log10(1 + P / floor^2), P the mean square sound pressure of a
-    frame in a band [Pa^2], the mean of L over the neighboring bands is taken
+    frame in a band, Pa^2, the mean of L over the neighboring bands is taken
     off (`contrast`); what is left below zero counts as zero.
 
     Args:
-        pressure: the recording (S) [Pa].
-        rate: its sampling rate [Hz].
+        pressure: the recording (S), Pa.
+        rate: its sampling rate, Hz.
 
     Returns:
         (bands, frames), non-negative.
@@ -304,7 +304,7 @@ def tap_recordings(voice: DrumVoice, rng: np.random.Generator) -> list[Array]:
     """What the microphone records when the experimenter taps the drum.
 
     A few firm taps with a hand as soft as the robot's, short and long, at the
-    center, half-way to the rim and near it, one recording each [Pa].
+    center, half-way to the rim and near it, one recording each, Pa.
     """
     t = np.arange(0.0, 1.5, 1e-3)
     a = voice.config.membrane.radius

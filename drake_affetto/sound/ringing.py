@@ -92,8 +92,8 @@ def ring(
     a contact begins or ends, see `_touches`.
 
     Args:
-        drive: modal forces (T, N) [N], `period` apart.
-        dashpot: damping constant of the hand (T) [N s/m].
+        drive: modal forces (T, N), N, `period` apart.
+        dashpot: damping constant of the hand (T), N s/m.
         shape: mode shapes at the hand (T, N).
         transition: see `transition_matrix`.
         mass: modal masses (N).

@@ -38,11 +38,11 @@ class Trial:
 
     kind: str
     impulse: float
-    """Impulse on the head [N s]."""
+    """Impulse on the head, N s."""
     rate_of_force: float
-    """Fastest change of the force on the head [N/s]."""
+    """Fastest change of the force on the head, N/s."""
     pressure: Array
-    """The recording [Pa]."""
+    """The recording, Pa."""
 
 
 def random_hand(rng: np.random.Generator, hard: bool = False) -> impact.Hand:
@@ -59,7 +59,7 @@ def random_hand(rng: np.random.Generator, hard: bool = False) -> impact.Hand:
 def random_mass_flow(
     t: Array, rng: np.random.Generator, valves: int = 16
 ) -> Array:
-    """Flow through the valves (T, valves) [kg/s]: leakage and movements."""
+    """Flow through the valves (T, valves), kg/s: leakage and movements."""
     knots = np.arange(t[0], t[-1] + 0.25, 0.15)
     opening = np.maximum(rng.normal(0.0, 1.0, (len(knots), valves)), 0.0)
     scale = rng.uniform(5e-5, 2e-4)

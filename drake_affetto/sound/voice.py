@@ -79,11 +79,11 @@ class DrumVoice:
 
     @property
     def rate(self) -> float:
-        """Sampling rate of the sound [Hz]."""
+        """Sampling rate of the sound, Hz."""
         return self.config.rate
 
     def mode_shapes(self, radius: ArrayLike) -> Array:
-        """Membrane mode shapes J_m(j_mn r/a), (T, N), at radii (T) [m]."""
+        """Membrane mode shapes J_m(j_mn r/a), (T, N), at radii (T), m."""
         scaled = np.clip(
             np.asarray(radius, dtype=float) / self.config.membrane.radius,
             0.0,
@@ -111,13 +111,13 @@ class DrumVoice:
         """The sound pressure at the microphone.
 
         Args:
-            t: times of the samples (T), evenly spaced [s].
-            head_force: normal force on the head (T) [N].
-            head_radius: where it acts, distance from the center (T) [m];
+            t: times of the samples (T), evenly spaced, s.
+            head_force: normal force on the head (T), N.
+            head_radius: where it acts, distance from the center (T), m;
                 read only where there is force.
-            shell_force: force on the shell (T) [N].
-            table_force: force on the table (T) [N].
-            mass_flow: air through the valves, (T) or (T, valves) [kg/s];
+            shell_force: force on the shell (T), N.
+            table_force: force on the table (T), N.
+            mass_flow: air through the valves, (T) or (T, valves), kg/s;
                 several jets add as independent noises.
             rng: source of all noise. Without it the microphone is noiseless
                 and the valves are silent.

@@ -14,11 +14,11 @@ class MembraneConfig:
     """The drum's head."""
 
     radius: float = 0.065
-    """Radius a [m]."""
+    """Radius a, m."""
     surface_density: float = 0.26
-    """Mass per area sigma [kg/m^2]."""
+    """Mass per area sigma, kg/m^2."""
     tension: float = 200.0
-    """Tension T [N/m]."""
+    """Tension T, N/m."""
     orders: int = 5
     """Number of angular orders: m = 0 .. orders - 1."""
     circles: int = 3
@@ -26,7 +26,7 @@ class MembraneConfig:
     loss_factor: float = 0.012
     """Internal loss eta: a mode decays by eta omega / 2."""
     decay_rate: float = 4.0
-    """Decay common to all modes (rim and support) [1/s]."""
+    """Decay common to all modes (rim and support), 1/s."""
     air_loading: bool = True
     """Whether the air on both sides adds to the membrane's mass."""
     hand_damping: float = 0.05
@@ -50,13 +50,13 @@ class BodyConfig:
     """A solid body that is knocked on: some resonances in parallel."""
 
     frequencies: list[float] = dataclasses.field(default_factory=list)
-    """Resonance frequencies [Hz]."""
+    """Resonance frequencies, Hz."""
     qualities: list[float] = dataclasses.field(default_factory=list)
     """Quality factor of each resonance."""
     masses: list[float] = dataclasses.field(default_factory=list)
-    """Modal mass of each resonance [kg]."""
+    """Modal mass of each resonance, kg."""
     area: float = 0.01
-    """Effective radiating area: volume velocity by modal velocity [m^2]."""
+    """Effective radiating area: volume velocity by modal velocity, m^2."""
     coupling: float = 0.0
     """Part of a force on this body that shakes the head as a whole."""
 
@@ -82,11 +82,11 @@ class HissConfig:
     """The noise of air jets in the valves."""
 
     gain: float = 10.0
-    """Sound pressure (rms) at the microphone by mass flow [Pa s/kg]."""
+    """Sound pressure (rms) at the microphone by mass flow, Pa s/kg."""
     low: float = 1500.0
-    """Lower edge of the hiss's band [Hz]."""
+    """Lower edge of the hiss's band, Hz."""
     high: float = 7000.0
-    """Upper edge of the hiss's band [Hz]."""
+    """Upper edge of the hiss's band, Hz."""
 
     def check(self, where: str) -> None:
         """Raises InputError naming the field that does not fit."""
@@ -120,7 +120,7 @@ class VoiceConfig:
     """All that the drum's sound depends on besides the forces."""
 
     rate: float = 16000.0
-    """Sampling rate of the sound [Hz]."""
+    """Sampling rate of the sound, Hz."""
     membrane: MembraneConfig = dataclasses.field(default_factory=MembraneConfig)
     shell: BodyConfig = dataclasses.field(default_factory=_shell_default)
     table: BodyConfig = dataclasses.field(default_factory=_table_default)
@@ -129,11 +129,11 @@ class VoiceConfig:
     """Part of a force at the edge of the head that shakes the shell; it falls
     with the square of the radius towards the center."""
     microphone_distance: float = 0.3
-    """Distance from the head's center to the microphone [m]."""
+    """Distance from the head's center to the microphone, m."""
     microphone_angle: float = 1.0
-    """Angle between the drum's axis and the microphone's direction [rad]."""
+    """Angle between the drum's axis and the microphone's direction, rad."""
     microphone_noise: float = 1e-3
-    """Noise of the microphone, white, rms [Pa]."""
+    """Noise of the microphone, white, rms, Pa."""
 
     def check(self, where: str) -> None:
         """Raises InputError naming the field that does not fit."""

@@ -27,12 +27,12 @@ def write_wav(
 
     Args:
         path: the file.
-        pressure: sound pressure (S) [Pa].
-        rate: sampling rate [Hz].
-        full_scale: pressure of the largest sample value [Pa].
+        pressure: sound pressure (S), Pa.
+        rate: sampling rate, Hz.
+        full_scale: pressure of the largest sample value, Pa.
 
     Returns:
-        The full scale that was used [Pa].
+        The full scale that was used, Pa.
 
     Raises:
         InputError: if the file cannot be written.
