@@ -19,6 +19,7 @@ from pydrake.systems.framework import (
 from drake_affetto.common.errors import require, require_range
 from drake_affetto.control.pidf import (
     DEFAULT_FILE,
+    ControlParameters,
     PidfGains,
     load_control,
     pidf_update,
@@ -29,10 +30,10 @@ from drake_affetto.control.pidf import (
 class PidfConfig:
     """How the joint controllers of a scenario are made.
 
-    Args:
+    Attributes:
         parameters: YAML file of `ControlParameters`.
         overlays: YAML files that change some of them.
-        period: of the updates, s.
+        period: Period of the updates, s.
     """
 
     parameters: str = DEFAULT_FILE
@@ -136,15 +137,24 @@ class PidfController(LeafSystem):
         builder: DiagramBuilder,
         config: PidfConfig,
         joint_names: Sequence[str],
+        parameters: ControlParameters | None = None,
         name: str = "pidf_controller",
     ) -> "PidfController":
-        """Adds the controller of the joints named to `builder`.
+        """Adds the controller of the named joints to `builder`.
+
+        Args:
+            builder: Builder of the Diagram.
+            config: Period, and the files of parameters.
+            joint_names: Names of the joints, in the order of the ports.
+            parameters: Parameters themselves, instead of the files.
+            name: Name of the system.
 
         Raises:
-            InputError: where the configuration does not fit.
+            InputError: If the configuration does not fit.
         """
         config.check(name)
-        parameters = load_control(config.parameters, tuple(config.overlays))
+        if parameters is None:
+            parameters = load_control(config.parameters, tuple(config.overlays))
         system = PidfController(
             parameters.for_joints(list(joint_names)),
             period=config.period,

@@ -28,6 +28,7 @@ from drake_affetto.pneumatics.chamber import (
 )
 from drake_affetto.pneumatics.parameters import (
     DEFAULT_FILE,
+    PneumaticParameters,
     largest_dead_time,
     load_parameters,
     resting_pressure,
@@ -40,13 +41,13 @@ _MODES = {"flow": FLOW_MODE, "regulator": REGULATOR_MODE}
 class PneumaticActuationConfig:
     """How the actuators of a scenario are made.
 
-    Args:
+    Attributes:
         mode: "flow" (the command is the valves' opening) or "regulator" (it
             is a pressure set-point for each chamber).
         parameters: YAML file of `PneumaticParameters`.
         overlays: YAML files that change some of them, for instance a fit.
-        time_step: update period, s; the plant's.
-        look_ahead: steps by which the joint state that the update reads lags
+        time_step: Update period, s; the plant's.
+        look_ahead: Steps by which the joint state that the update reads lags
             behind the one the torque will act on. 0 for a MultibodyPlant with
             sampled output ports (its default): its step is an unrestricted
             update, which Drake does before the discrete ones of that instant.
@@ -189,15 +190,26 @@ class PneumaticActuation(LeafSystem):
         joint_names: Sequence[str],
         q_lower: ArrayLike,
         q_upper: ArrayLike,
+        parameters: PneumaticParameters | None = None,
         name: str = "pneumatic_actuation",
     ) -> "PneumaticActuation":
-        """Adds the actuators of the joints named to `builder`.
+        """Adds the actuators of the named joints to `builder`.
+
+        Args:
+            builder: Builder of the Diagram.
+            config: Mode, step and the files of parameters.
+            joint_names: Names of the joints, in the order of the ports.
+            q_lower: Lower limits of the joints (n,), rad.
+            q_upper: Upper limits of the joints (n,), rad.
+            parameters: Parameters themselves, instead of the files.
+            name: Name of the system.
 
         Raises:
-            InputError: where the configuration does not fit.
+            InputError: If the configuration does not fit.
         """
         config.check(name)
-        parameters = load_parameters(config.parameters, config.overlays)
+        if parameters is None:
+            parameters = load_parameters(config.parameters, config.overlays)
         system = PneumaticActuation(
             parameters.for_joints(joint_names, q_lower, q_upper),
             mode=config.mode,

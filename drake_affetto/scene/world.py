@@ -89,17 +89,17 @@ class FramePose:
 class WorldConfig:
     """Which models make the world.
 
-    Args:
-        directives: model directives of everything but the drum. They must
+    Attributes:
+        directives: Model directives of everything but the drum. They must
             weld `affetto::pelvis`, `table::table_top` (through a frame
             `table_pose`) and `mirror::mirror` to the world.
-        drum: model of the drum; its root link is the one that stands on the
+        drum: Model of the drum; its root link is the one that stands on the
             table.
-        drum_position: where the drum stands in a default context, world
-            x and y [m].
-        default_posture: joint -> angle [rad] of the default context; joints
-            that are not named stand at zero.
-        frames: frame of the directives -> where it is instead, for instance
+        drum_position: Position of the drum in a default context, world x and
+            y, m.
+        default_posture: Joint -> angle in the default context, rad; joints
+            that are not named are at zero.
+        frames: Frame of the directives -> its other pose, for instance of
             `affetto_base` or `mirror_pose`.
     """
 

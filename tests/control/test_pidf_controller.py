@@ -12,7 +12,13 @@ from pydrake.systems.primitives import (
 import pytest
 
 from drake_affetto.common.errors import InputError
-from drake_affetto.control.pidf import PidfGains, load_control, pidf_update
+from drake_affetto.control.pidf import (
+    ControlParameters,
+    JointGains,
+    PidfGains,
+    load_control,
+    pidf_update,
+)
 from drake_affetto.control.pidf_controller import PidfConfig, PidfController
 from drake_affetto.pneumatics.actuation import (
     PneumaticActuation,
@@ -303,3 +309,17 @@ def test_arm_reaches_another_posture_and_rests_there(body):
 
 def test_default_gains_name_every_active_joint():
     assert set(ACTIVE_JOINTS) <= set(load_control().gains)
+
+
+def test_parameters_may_be_values_instead_of_files():
+    """For joints that no file of this repository knows."""
+    builder = DiagramBuilder()
+    gains = JointGains(kP=5e5, kI=3e5, kD=2.5e4, kF=1.5e-5)
+    system = PidfController.AddToBuilder(
+        builder=builder,
+        config=PidfConfig(),
+        joint_names=["elbow"],
+        parameters=ControlParameters(gains={"elbow": gains}),
+    )
+    builder.Build()
+    assert system.get_valve_opening_output_port().size() == 1

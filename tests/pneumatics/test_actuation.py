@@ -24,6 +24,9 @@ from drake_affetto.pneumatics.chamber import (
     step_joints,
 )
 from drake_affetto.pneumatics.parameters import (
+    ActuatorClass,
+    JointActuator,
+    PneumaticParameters,
     chamber_volumes,
     load_parameters,
     resting_pressure,
@@ -366,3 +369,24 @@ def test_stiction_holds_while_the_pressure_difference_moves_by_60_kpa():
     # Δp swings by ±30 and by ±60 kPa about the balance.
     assert moved[30e3] < 0.3
     assert moved[60e3] > 3.0
+
+
+def test_parameters_may_be_values_instead_of_files():
+    """For joints that no file of this repository knows."""
+    air = PneumaticParameters(
+        classes={"small": ActuatorClass()},
+        joints={"elbow": JointActuator("small")},
+    )
+    builder = DiagramBuilder()
+    system = PneumaticActuation.AddToBuilder(
+        builder=builder,
+        config=PneumaticActuationConfig(),
+        joint_names=["elbow"],
+        q_lower=[-1.0],
+        q_upper=[1.0],
+        parameters=air,
+        name="air",
+    )
+    diagram = builder.Build()
+    assert diagram.GetSubsystemByName("air") is system
+    assert system.get_actuation_output_port().size() == 1
