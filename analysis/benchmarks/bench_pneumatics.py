@@ -12,6 +12,7 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.primitives import ConstantVectorSource, MatrixGain
 
+from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.pneumatics.actuation import PneumaticActuation
 from drake_affetto.pneumatics.chamber import Row
 from drake_affetto.pneumatics.flow import GAS_CONSTANT, REFERENCE_DENSITY
@@ -55,22 +56,12 @@ class NumpyActuation(LeafSystem):
         self._bristle = self.DeclareDiscreteState(n)
         slots = round(float(np.max(par[Row.DEAD_TIME])) / _STEP) + 1
         self._line = np.zeros((slots, n))
-        self._torque_port = self.DeclareStateOutputPort(
-            "actuation", self._torque
-        )
+        self.DeclareStateOutputPort("actuation", self._torque)
         self.DeclarePeriodicDiscreteUpdateEvent(_STEP, 0.0, self._update)
 
-    def get_command_input_port(self):
-        """v⁺ (n)."""
-        return self._command_port
-
-    def get_estimated_state_input_port(self):
-        """[q; q̇] (2n)."""
-        return self._state_port
-
-    def get_actuation_output_port(self):
-        """Torque (n), N m."""
-        return self._torque_port
+    get_command_input_port = input_port("v⁺ (n).", index=0)
+    get_estimated_state_input_port = input_port("[q; q̇] (2n).")
+    get_actuation_output_port = output_port("Torque (n), N m.")
 
     def _update(self, context, discrete_state):
         par, n, h = self._par, self._n, _STEP

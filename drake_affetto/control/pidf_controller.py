@@ -11,12 +11,11 @@ from pydrake.systems.framework import (
     DiagramBuilder,
     DiscreteValues,
     EventStatus,
-    InputPort,
     LeafSystem,
-    OutputPort,
 )
 
 from drake_affetto.common.errors import require, require_range
+from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.control.pidf import (
     DEFAULT_FILE,
     ControlParameters,
@@ -121,12 +120,8 @@ class PidfController(LeafSystem):
         self._integral_index = self.DeclareDiscreteState(n)
         self._demand_index = self.DeclareDiscreteState(n)
         self._opening_index = self.DeclareDiscreteState(n)
-        self._opening_port = self.DeclareStateOutputPort(
-            "valve_opening", self._opening_index
-        )
-        self._demand_port = self.DeclareStateOutputPort(
-            "pid_output", self._demand_index
-        )
+        self.DeclareStateOutputPort("valve_opening", self._opening_index)
+        self.DeclareStateOutputPort("pid_output", self._demand_index)
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=self._period, offset_sec=0.0, update=self._update
         )
@@ -164,29 +159,14 @@ class PidfController(LeafSystem):
         )
         return builder.AddNamedSystem(name, system)
 
-    def get_desired_state_input_port(self) -> InputPort:
-        """[q_des; q̇_des] (2n), rad and rad/s."""
-        return self._desired_port
-
-    def get_estimated_state_input_port(self) -> InputPort:
-        """[q; q̇] (2n), rad and rad/s."""
-        return self._state_port
-
-    def get_chamber_pressure_input_port(self) -> InputPort:
-        """[p_a; p_b] (2n), Pa."""
-        return self._pressure_port
-
-    def get_equilibrium_offset_input_port(self) -> InputPort:
-        """u_eq (n), Pa."""
-        return self._offset_port
-
-    def get_valve_opening_output_port(self) -> OutputPort:
-        """v⁺ (n) in [-1, 1]."""
-        return self._opening_port
-
-    def get_pid_output_output_port(self) -> OutputPort:
-        """u (n), Pa."""
-        return self._demand_port
+    get_desired_state_input_port = input_port(
+        "[q_des; q̇_des] (2n), rad and rad/s."
+    )
+    get_estimated_state_input_port = input_port("[q; q̇] (2n), rad and rad/s.")
+    get_chamber_pressure_input_port = input_port("[p_a; p_b] (2n), Pa.")
+    get_equilibrium_offset_input_port = input_port("u_eq (n), Pa.")
+    get_valve_opening_output_port = output_port("v⁺ (n) in [-1, 1].")
+    get_pid_output_output_port = output_port("u (n), Pa.")
 
     @property
     def num_joints(self) -> int:

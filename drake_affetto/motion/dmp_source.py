@@ -9,12 +9,11 @@ from pydrake.systems.framework import (
     Context,
     DiagramBuilder,
     DiscreteValues,
-    InputPort,
     LeafSystem,
-    OutputPort,
 )
 
 from drake_affetto.common.errors import require, require_array, require_range
+from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.motion.dmp import Dmp
 
 
@@ -90,7 +89,7 @@ class DmpSource(LeafSystem):
         phase_index = self.DeclareDiscreteState(BasicVector(np.ones(1)))
         self._state_index = int(state_index)
         self._phase_index = int(phase_index)
-        self._state_output = self.DeclareStateOutputPort(
+        self.DeclareStateOutputPort(
             name="desired_state", state_index=state_index
         )
         self.DeclarePeriodicDiscreteUpdateEvent(
@@ -107,17 +106,9 @@ class DmpSource(LeafSystem):
         """n."""
         return self._n
 
-    def get_policy_parameters_input_port(self) -> InputPort:
-        """θ (F,), rad/s²."""
-        return self._parameters_input
-
-    def get_start_time_input_port(self) -> InputPort:
-        """When the movement starts (1,), s."""
-        return self._start_time_input
-
-    def get_desired_state_output_port(self) -> OutputPort:
-        """[q; q̇] (2n,), rad and rad/s."""
-        return self._state_output
+    get_policy_parameters_input_port = input_port("θ (F,), rad/s².")
+    get_start_time_input_port = input_port("When the movement starts (1,), s.")
+    get_desired_state_output_port = output_port("[q; q̇] (2n,), rad and rad/s.")
 
     def set_start_posture(self, context: Context, q: ArrayLike) -> None:
         """Makes q (n,), rad, the start posture and goal, and rests there.
@@ -204,6 +195,4 @@ class DmpSource(LeafSystem):
     ) -> "DmpSource":
         """Adds a DmpSource of that name to the builder and returns it."""
         system = DmpSource(dmp, num_joints, update_period=update_period)
-        system.set_name(name)
-        builder.AddSystem(system)
-        return system
+        return builder.AddNamedSystem(name, system)

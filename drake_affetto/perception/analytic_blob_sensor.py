@@ -10,11 +10,11 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import (
     Context,
     DiagramBuilder,
-    InputPort,
     OutputPort,
 )
 
 from drake_affetto.common.errors import InputError, require
+from drake_affetto.common.systems import input_port
 from drake_affetto.geometry.optics import project_disc
 from drake_affetto.perception.analytic import (
     Occluders,
@@ -133,11 +133,8 @@ class AnalyticBlobSensor(BlobReporter):
         )
         return sensor
 
-    def get_query_object_input_port(self) -> InputPort:
-        return self._query_port
-
-    def get_sight_input_port(self) -> InputPort:
-        return self._sight_port
+    get_query_object_input_port = input_port("The SceneGraph's query port.")
+    get_sight_input_port = input_port("`CameraSnapshot` of a `MirrorCamera`.")
 
     def _find(self, context: Context) -> Blob | None:
         query: Any = self._query_port.Eval(context)

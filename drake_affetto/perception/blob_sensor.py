@@ -9,13 +9,13 @@ from pydrake.systems.framework import (
     BasicVector,
     Context,
     DiagramBuilder,
-    InputPort,
     LeafSystem,
     OutputPort,
     ValueProducer,
 )
 from pydrake.systems.sensors import ImageRgba8U
 
+from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.perception.blob import (
     Blob,
     BlobCalibration,
@@ -52,13 +52,13 @@ class BlobReporter(LeafSystem):
             ),
             prerequisites_of_calc=prerequisites,
         )
-        self._blob_port = self.DeclareVectorOutputPort(
+        self.DeclareVectorOutputPort(
             "blob",
             3,
             self._calc_blob,
             prerequisites | {self.all_parameters_ticket()},
         )
-        self._pixels_port = self.DeclareVectorOutputPort(
+        self.DeclareVectorOutputPort(
             "blob_pixels", 4, self._calc_pixels, prerequisites
         )
 
@@ -66,11 +66,10 @@ class BlobReporter(LeafSystem):
         """The marker, if it is seen."""
         raise NotImplementedError
 
-    def get_blob_output_port(self) -> OutputPort:
-        return self._blob_port
-
-    def get_blob_pixels_output_port(self) -> OutputPort:
-        return self._pixels_port
+    get_blob_output_port = output_port("x_img, y_img, found (3).")
+    get_blob_pixels_output_port = output_port(
+        "u, v, px, area, px², and confidence (4)."
+    )
 
     @property
     def config(self) -> BlobConfig:
@@ -159,8 +158,7 @@ class BlobSensor(BlobReporter):
         builder.Connect(color_image, sensor.get_color_image_input_port())
         return sensor
 
-    def get_color_image_input_port(self) -> InputPort:
-        return self._image_port
+    get_color_image_input_port = input_port("The image (ImageRgba8U).")
 
     def _find(self, context: Context) -> Blob | None:
         image: Any = self._image_port.Eval(context)

@@ -9,12 +9,12 @@ from pydrake.systems.framework import (
     Context,
     DiagramBuilder,
     DiscreteValues,
-    InputPort,
     LeafSystem,
     OutputPort,
 )
 
 from drake_affetto.common.errors import require, require_range
+from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.geometry.optics import Camera
 from drake_affetto.perception.blob import BlobCalibration
 from drake_affetto.perception.gaze import (
@@ -138,21 +138,15 @@ class GazeServo(LeafSystem):
 
         state = {self.xd_ticket(), self.all_parameters_ticket()}
         timed = state | {self.time_ticket()}
-        self._yaw_port = self.DeclareVectorOutputPort(
+        self.DeclareVectorOutputPort(
             "yaw_command", 1, self._calc_yaw_command, timed
         )
-        self._tau_port = self.DeclareVectorOutputPort(
+        self.DeclareVectorOutputPort(
             "task_parameter", 2, self._calc_task_parameter, state
         )
-        self._settled_port = self.DeclareVectorOutputPort(
-            "settled", 1, self._calc_settled, state
-        )
-        self._failed_port = self.DeclareVectorOutputPort(
-            "failed", 1, self._calc_failed, state
-        )
-        self._ready_port = self.DeclareVectorOutputPort(
-            "ready", 1, self._calc_ready, timed
-        )
+        self.DeclareVectorOutputPort("settled", 1, self._calc_settled, state)
+        self.DeclareVectorOutputPort("failed", 1, self._calc_failed, state)
+        self.DeclareVectorOutputPort("ready", 1, self._calc_ready, timed)
 
     @staticmethod
     def AddToBuilder(
@@ -176,26 +170,21 @@ class GazeServo(LeafSystem):
         builder.Connect(estimated_state, servo.get_estimated_state_input_port())
         return servo
 
-    def get_blob_input_port(self) -> InputPort:
-        return self._blob_port
-
-    def get_estimated_state_input_port(self) -> InputPort:
-        return self._state_port
-
-    def get_yaw_command_output_port(self) -> OutputPort:
-        return self._yaw_port
-
-    def get_task_parameter_output_port(self) -> OutputPort:
-        return self._tau_port
-
-    def get_settled_output_port(self) -> OutputPort:
-        return self._settled_port
-
-    def get_failed_output_port(self) -> OutputPort:
-        return self._failed_port
-
-    def get_ready_output_port(self) -> OutputPort:
-        return self._ready_port
+    get_blob_input_port = input_port("x_img, y_img, found (3).")
+    get_estimated_state_input_port = input_port("[q; q̇] (2n), rad and rad/s.")
+    get_yaw_command_output_port = output_port(
+        "Where the yaw joint should be (1), rad."
+    )
+    get_task_parameter_output_port = output_port(
+        "τ or τ̂ (2), zeros until it is settled."
+    )
+    get_settled_output_port = output_port("1 once τ is known (1), else 0.")
+    get_failed_output_port = output_port(
+        "1 once the marker is given up (1), else 0."
+    )
+    get_ready_output_port = output_port(
+        "1 once τ is known and the yaw is back (1), else 0."
+    )
 
     # Parameters of a trial
 

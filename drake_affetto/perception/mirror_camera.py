@@ -28,14 +28,13 @@ from pydrake.systems.framework import (
     BasicVector,
     Context,
     DiagramBuilder,
-    InputPort,
     LeafSystem,
-    OutputPort,
     ValueProducer,
 )
 from pydrake.systems.sensors import CameraInfo, ImageLabel16I, ImageRgba8U
 
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.geometry.optics import (
     FisheyeCamera,
     MirrorView,
@@ -229,25 +228,25 @@ class MirrorCamera(LeafSystem):
             prerequisites_of_calc=scene,
         )
         width, height = config.width, config.height
-        self._color_port = self.DeclareAbstractOutputPort(
+        self.DeclareAbstractOutputPort(
             "color_image",
             Value(ImageRgba8U(width, height, 255)).Clone,
             self._calc_color_image,
             scene | {self.time_ticket()},
         )
-        self._label_port = self.DeclareAbstractOutputPort(
+        self.DeclareAbstractOutputPort(
             "label_image",
             Value(ImageLabel16I(width, height)).Clone,
             self._calc_label_image,
             scene,
         )
-        self._pose_port = self.DeclareAbstractOutputPort(
+        self.DeclareAbstractOutputPort(
             "body_pose_in_world",
             Value(RigidTransform()).Clone,
             self._calc_pose,
             scene,
         )
-        self._sight_port = self.DeclareAbstractOutputPort(
+        self.DeclareAbstractOutputPort(
             "sight",
             Value(CameraSnapshot(np.eye(4))).Clone,
             self._calc_sight,
@@ -277,20 +276,17 @@ class MirrorCamera(LeafSystem):
 
     # Ports
 
-    def get_query_object_input_port(self) -> InputPort:
-        return self._query_port
-
-    def get_color_image_output_port(self) -> OutputPort:
-        return self._color_port
-
-    def get_label_image_output_port(self) -> OutputPort:
-        return self._label_port
-
-    def get_body_pose_in_world_output_port(self) -> OutputPort:
-        return self._pose_port
-
-    def get_sight_output_port(self) -> OutputPort:
-        return self._sight_port
+    get_query_object_input_port = input_port("The SceneGraph's query port.")
+    get_color_image_output_port = output_port(
+        "What the camera sees (ImageRgba8U)."
+    )
+    get_label_image_output_port = output_port(
+        "Labels of what it sees (ImageLabel16I)."
+    )
+    get_body_pose_in_world_output_port = output_port("X_WC (RigidTransform).")
+    get_sight_output_port = output_port(
+        "Poses and parameters (`CameraSnapshot`)."
+    )
 
     # What a user may ask or set
 

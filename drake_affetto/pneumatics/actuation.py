@@ -11,12 +11,11 @@ from pydrake.systems.framework import (
     Context,
     DiagramBuilder,
     DiscreteValues,
-    InputPort,
     LeafSystem,
-    OutputPort,
 )
 
 from drake_affetto.common.errors import require, require_array, require_range
+from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.pneumatics.chamber import (
     FLOW_MODE,
     REGULATOR_MODE,
@@ -169,15 +168,9 @@ class PneumaticActuation(LeafSystem):
         self._memory_index = self.DeclareDiscreteState(
             memory_size(n, self._time_step, max_dead_time)
         )
-        self._torque_port = self.DeclareStateOutputPort(
-            "actuation", self._torque_index
-        )
-        self._pressure_port = self.DeclareStateOutputPort(
-            "chamber_pressure", self._pressure_index
-        )
-        self._flow_port = self.DeclareStateOutputPort(
-            "mass_flow", self._flow_index
-        )
+        self.DeclareStateOutputPort("actuation", self._torque_index)
+        self.DeclareStateOutputPort("chamber_pressure", self._pressure_index)
+        self.DeclareStateOutputPort("mass_flow", self._flow_index)
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=self._time_step, offset_sec=0.0, update=self._update
         )
@@ -218,25 +211,18 @@ class PneumaticActuation(LeafSystem):
         )
         return builder.AddNamedSystem(name, system)
 
-    def get_command_input_port(self) -> InputPort:
-        """`valve_opening` or `pressure_command`, whichever the mode has."""
-        return self._command_port
-
-    def get_estimated_state_input_port(self) -> InputPort:
-        """[q; q̇] (2n), rad and rad/s."""
-        return self._state_port
-
-    def get_actuation_output_port(self) -> OutputPort:
-        """Torque on each joint (n), N m."""
-        return self._torque_port
-
-    def get_chamber_pressure_output_port(self) -> OutputPort:
-        """[p_a; p_b] (2n), Pa absolute."""
-        return self._pressure_port
-
-    def get_mass_flow_output_port(self) -> OutputPort:
-        """Flow into each chamber (2n), kg/s."""
-        return self._flow_port
+    get_command_input_port = input_port(
+        "`valve_opening` or `pressure_command`, whichever the mode has.",
+        index=0,
+    )
+    get_estimated_state_input_port = input_port("[q; q̇] (2n), rad and rad/s.")
+    get_actuation_output_port = output_port("Torque on each joint (n), N m.")
+    get_chamber_pressure_output_port = output_port(
+        "[p_a; p_b] (2n), Pa absolute."
+    )
+    get_mass_flow_output_port = output_port(
+        "Flow into each chamber (2n), kg/s."
+    )
 
     @property
     def num_joints(self) -> int:

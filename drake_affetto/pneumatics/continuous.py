@@ -13,6 +13,7 @@ from pydrake.systems.framework import BasicVector_, Context_, LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from drake_affetto.common.errors import require
+from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.pneumatics.chamber import ROWS, Row
 from drake_affetto.pneumatics.flow import (
     GAS_CONSTANT,
@@ -119,10 +120,10 @@ def ContinuousPneumaticActuation_(T):
                 "estimated_state", 2 * n
             )
             state_only = {self.xc_ticket()}
-            self._torque_port = self.DeclareVectorOutputPort(
+            self.DeclareVectorOutputPort(
                 "actuation", n, self._calc_torque, state_only
             )
-            self._pressure_port = self.DeclareVectorOutputPort(
+            self.DeclareVectorOutputPort(
                 "chamber_pressure", 2 * n, self._calc_pressure, state_only
             )
 
@@ -131,21 +132,18 @@ def ContinuousPneumaticActuation_(T):
                 self, other._array, mode=other._mode, converter=converter
             )
 
-        def get_command_input_port(self):
-            """`valve_opening` or `pressure_command`."""
-            return self._command_port
-
-        def get_estimated_state_input_port(self):
-            """[q; q̇] (2n), rad and rad/s."""
-            return self._state_port
-
-        def get_actuation_output_port(self):
-            """Torque on each joint (n), N m."""
-            return self._torque_port
-
-        def get_chamber_pressure_output_port(self):
-            """[p_a; p_b] (2n), Pa absolute."""
-            return self._pressure_port
+        get_command_input_port = input_port(
+            "`valve_opening` or `pressure_command`.", index=0
+        )
+        get_estimated_state_input_port = input_port(
+            "[q; q̇] (2n), rad and rad/s."
+        )
+        get_actuation_output_port = output_port(
+            "Torque on each joint (n), N m."
+        )
+        get_chamber_pressure_output_port = output_port(
+            "[p_a; p_b] (2n), Pa absolute."
+        )
 
         def set_pressures(self, context: Context_[T], p_a, p_b, q) -> None:
             """Sets pressures (n) [Pa absolute] at the joint angles q [rad].

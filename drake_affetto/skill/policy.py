@@ -12,9 +12,7 @@ from pydrake.systems.framework import (
     Context,
     DiagramBuilder,
     DiscreteValues,
-    InputPort,
     LeafSystem,
-    OutputPort,
 )
 
 from drake_affetto.common.errors import (
@@ -23,6 +21,7 @@ from drake_affetto.common.errors import (
     require_array,
     require_range,
 )
+from drake_affetto.common.systems import input_port, output_port
 
 
 class Regressor(Protocol):
@@ -134,31 +133,22 @@ class SkillPolicy(LeafSystem):
         self._theta_index = int(theta_index)
         self._start_index = int(start_index)
         self._latched_index = int(self.DeclareDiscreteState(1))
-        self._theta_output = self.DeclareStateOutputPort(
+        self.DeclareStateOutputPort(
             name="policy_parameters", state_index=theta_index
         )
-        self._start_output = self.DeclareStateOutputPort(
-            name="start_time", state_index=start_index
-        )
+        self.DeclareStateOutputPort(name="start_time", state_index=start_index)
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=config.update_period, offset_sec=0.0, update=self._update
         )
 
-    def get_task_parameter_input_port(self) -> InputPort:
-        """τ (d,)."""
-        return self._task_input
-
-    def get_settled_input_port(self) -> InputPort:
-        """Above 0.5 once τ can be relied on (1,)."""
-        return self._settled_input
-
-    def get_policy_parameters_output_port(self) -> OutputPort:
-        """θ (F,), rad/s²."""
-        return self._theta_output
-
-    def get_start_time_output_port(self) -> OutputPort:
-        """When the movement starts (1,), s."""
-        return self._start_output
+    get_task_parameter_input_port = input_port("τ (d,).")
+    get_settled_input_port = input_port(
+        "Above 0.5 once τ can be relied on (1,)."
+    )
+    get_policy_parameters_output_port = output_port("θ (F,), rad/s².")
+    get_start_time_output_port = output_port(
+        "When the movement starts (1,), s."
+    )
 
     def set_regressor(self, context: Context, regressor: Regressor) -> None:
         """Makes `regressor` the skill of this context, and waits anew.
@@ -252,6 +242,4 @@ class SkillPolicy(LeafSystem):
             num_task_parameters=num_task_parameters,
             config=config,
         )
-        system.set_name(name)
-        builder.AddSystem(system)
-        return system
+        return builder.AddNamedSystem(name, system)

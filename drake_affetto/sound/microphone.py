@@ -15,10 +15,10 @@ from pydrake.systems.framework import (
     DiagramBuilder,
     InputPort,
     LeafSystem,
-    OutputPort,
 )
 
 from drake_affetto.common.errors import require
+from drake_affetto.common.systems import input_port, output_port
 
 
 class DrumMicrophone(LeafSystem):
@@ -106,10 +106,10 @@ class DrumMicrophone(LeafSystem):
             self._contact_results_port.get_index()
         )
         poses = self.input_port_ticket(self._body_poses_port.get_index())
-        self._contact_force_port: OutputPort = self.DeclareVectorOutputPort(
+        self.DeclareVectorOutputPort(
             "contact_force", 2, self._calc_contact_force, {contacts, poses}
         )
-        self._knock_force_port: OutputPort = self.DeclareVectorOutputPort(
+        self.DeclareVectorOutputPort(
             "knock_force", 2, self._calc_knock_force, {contacts}
         )
 
@@ -162,21 +162,14 @@ class DrumMicrophone(LeafSystem):
         )
         return microphone
 
-    def get_contact_results_input_port(self) -> InputPort:
-        """The plant's contact results."""
-        return self._contact_results_port
-
-    def get_body_poses_input_port(self) -> InputPort:
-        """The plant's body poses."""
-        return self._body_poses_port
-
-    def get_contact_force_output_port(self) -> OutputPort:
-        """Normal force on the head [N] and its distance from the center, m."""
-        return self._contact_force_port
-
-    def get_knock_force_output_port(self) -> OutputPort:
-        """Force on the shell and force on the table, N."""
-        return self._knock_force_port
+    get_contact_results_input_port = input_port("The plant's contact results.")
+    get_body_poses_input_port = input_port("The plant's body poses.")
+    get_contact_force_output_port = output_port(
+        "Normal force on the head [N] and its distance from the center, m."
+    )
+    get_knock_force_output_port = output_port(
+        "Force on the shell and force on the table, N."
+    )
 
     def _calc_contact_force(self, context: Context, output: BasicVector):
         result = output.get_mutable_value()

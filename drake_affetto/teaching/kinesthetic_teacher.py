@@ -15,12 +15,11 @@ from pydrake.systems.framework import (
     Context,
     DiagramBuilder,
     DiscreteValues,
-    InputPort,
     LeafSystem,
-    OutputPort,
 )
 
 from drake_affetto.common.errors import require
+from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.common.typing import Array
 from drake_affetto.teaching.stroke import (
     Stroke,
@@ -101,13 +100,13 @@ class KinestheticTeacher(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=self._dt, offset_sec=0.0, update=self._update
         )
-        self._force_port = self.DeclareAbstractOutputPort(
+        self.DeclareAbstractOutputPort(
             name="spatial_force",
             alloc=lambda: Value([ExternallyAppliedSpatialForce()]),
             calc=self._calc_spatial_force,
             prerequisites_of_calc={self.xd_ticket()},
         )
-        self._pulling_port = self.DeclareVectorOutputPort(
+        self.DeclareVectorOutputPort(
             name="pulling_force",
             size=3,
             calc=self._calc_pulling_force,
@@ -149,17 +148,15 @@ class KinestheticTeacher(LeafSystem):
         )
         return teacher
 
-    def get_estimated_state_input_port(self) -> InputPort:
-        """Angles and rates of the n joints (2n), rad, rad/s."""
-        return self._state_port
-
-    def get_spatial_force_output_port(self) -> OutputPort:
-        """The list for MultibodyPlant's applied_spatial_force."""
-        return self._force_port
-
-    def get_pulling_force_output_port(self) -> OutputPort:
-        """Force on the palm (3), world frame, N."""
-        return self._pulling_port
+    get_estimated_state_input_port = input_port(
+        "Angles and rates of the n joints (2n), rad, rad/s."
+    )
+    get_spatial_force_output_port = output_port(
+        "The list for MultibodyPlant's applied_spatial_force."
+    )
+    get_pulling_force_output_port = output_port(
+        "Force on the palm (3), world frame, N."
+    )
 
     def set_posture(self, q: Array) -> None:
         """Sets the positions of the joints that are not in the input.

@@ -22,6 +22,7 @@ from pydrake.systems.framework import (
 )
 
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.common.typing import Array
 from drake_affetto.teaching.stroke import TeacherConfig
 
@@ -112,30 +113,26 @@ class MouseTeacher(LeafSystem):
             self._velocities_in.ticket(),
             self.xd_ticket(),
         }
-        self._force_port = self.DeclareAbstractOutputPort(
+        self.DeclareAbstractOutputPort(
             name="spatial_force",
             alloc=lambda: Value([ExternallyAppliedSpatialForce()]),
             calc=self._calc_spatial_force,
             prerequisites_of_calc=needed,
         )
-        self._pulling_port = self.DeclareVectorOutputPort(
+        self.DeclareVectorOutputPort(
             name="pulling_force",
             size=3,
             calc=self._calc_pulling_force,
             prerequisites_of_calc=needed,
         )
 
-    def get_mouse_force_input_port(self) -> InputPort:
-        """Forces of Drake's mouse spring."""
-        return self._force_in
-
-    def get_spatial_force_output_port(self) -> OutputPort:
-        """The list for MultibodyPlant's applied_spatial_force."""
-        return self._force_port
-
-    def get_pulling_force_output_port(self) -> OutputPort:
-        """Force on the hand (3), world frame, N."""
-        return self._pulling_port
+    get_mouse_force_input_port = input_port("Forces of Drake's mouse spring.")
+    get_spatial_force_output_port = output_port(
+        "The list for MultibodyPlant's applied_spatial_force."
+    )
+    get_pulling_force_output_port = output_port(
+        "Force on the hand (3), world frame, N."
+    )
 
     @staticmethod
     def AddToBuilder(

@@ -1,0 +1,76 @@
+"""What systems of this package have in common: getters of their ports.
+
+The one module of this room that needs Drake to be imported.
+"""
+
+from collections.abc import Callable
+from typing import Any, cast
+
+from pydrake.systems.framework import InputPort, OutputPort
+
+
+def input_port(
+    doc: str, *, index: int | None = None
+) -> Callable[[Any], InputPort]:
+    """A method that returns the input port for which it is named.
+
+    `get_blob_input_port = input_port("The marker (3).")` in the class of a
+    system makes the method `get_blob_input_port()`, as `def` would, which
+    returns the input port "blob".
+
+    Args:
+        doc: Docstring of the method: what the port takes, shape and units.
+        index: Index of the port, where it has another name than the method.
+
+    Raises:
+        TypeError: If the method is not called `get_..._input_port`.
+    """
+
+    def find(system: Any, port: str) -> InputPort:
+        if index is not None:
+            return system.get_input_port(index)
+        return system.GetInputPort(port)
+
+    return cast(Callable[[Any], InputPort], _Getter(find, InputPort, doc))
+
+
+def output_port(doc: str) -> Callable[[Any], OutputPort]:
+    """A method that returns the output port for which it is named.
+
+    Args:
+        doc: Docstring of the method: what the port gives, shape and units.
+
+    Raises:
+        TypeError: If the method is not called `get_..._output_port`.
+    """
+
+    def find(system: Any, port: str) -> OutputPort:
+        return system.GetOutputPort(port)
+
+    return cast(Callable[[Any], OutputPort], _Getter(find, OutputPort, doc))
+
+
+class _Getter:
+    """Stands for a method until its class gives it a name."""
+
+    def __init__(
+        self, find: Callable[[Any, str], Any], kind: type, doc: str
+    ) -> None:
+        self._find, self._kind, self._doc = find, kind, doc
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        """Puts a plain function in its own place, as `def` would have."""
+        find = self._find
+        ending = "_input_port" if self._kind is InputPort else "_output_port"
+        port = name.removeprefix("get_").removesuffix(ending)
+        if name != f"get_{port}{ending}":
+            raise TypeError(f"{name} should be get_<port>{ending}")
+
+        def get(self):
+            return find(self, port)
+
+        get.__name__, get.__doc__ = name, self._doc
+        get.__annotations__["return"] = self._kind
+        get.__module__ = owner.__module__
+        get.__qualname__ = f"{owner.__qualname__}.{name}"
+        setattr(owner, name, get)
