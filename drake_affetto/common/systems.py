@@ -1,4 +1,4 @@
-"""What systems of this package have in common: getters of their ports.
+"""What systems of this package have in common: ports and their connections.
 
 The one module of this room that needs Drake to be imported.
 """
@@ -6,7 +6,12 @@ The one module of this room that needs Drake to be imported.
 from collections.abc import Callable
 from typing import Any, cast
 
-from pydrake.systems.framework import InputPort, OutputPort
+from pydrake.systems.framework import (
+    DiagramBuilder,
+    InputPort,
+    OutputPort,
+    System,
+)
 
 
 def input_port(
@@ -48,6 +53,21 @@ def output_port(doc: str) -> Callable[[Any], OutputPort]:
         return system.GetOutputPort(port)
 
     return cast(Callable[[Any], OutputPort], _Getter(find, OutputPort, doc))
+
+
+def connect(
+    builder: DiagramBuilder, source: System, target: System, *ports: str
+) -> None:
+    """Connects outputs of `source` to the inputs of `target` of their names.
+
+    Args:
+        builder: Builder that has both systems.
+        source: System with the output ports.
+        target: System with the input ports.
+        ports: Names that both ports of a connection have.
+    """
+    for name in ports:
+        builder.Connect(source.GetOutputPort(name), target.GetInputPort(name))
 
 
 class _Getter:

@@ -14,7 +14,7 @@ from pydrake.systems.framework import (
 )
 
 from drake_affetto.common.errors import InputError, require
-from drake_affetto.common.systems import input_port
+from drake_affetto.common.systems import connect, input_port
 from drake_affetto.geometry.optics import project_disc
 from drake_affetto.perception.analytic import (
     Occluders,
@@ -128,9 +128,7 @@ class AnalyticBlobSensor(BlobReporter):
         sensor = AnalyticBlobSensor(plant, camera.config, config, radius=radius)
         builder.AddNamedSystem(name, sensor)
         builder.Connect(query_object, sensor.get_query_object_input_port())
-        builder.Connect(
-            camera.get_sight_output_port(), sensor.get_sight_input_port()
-        )
+        connect(builder, camera, sensor, "sight")
         return sensor
 
     get_query_object_input_port = input_port("The SceneGraph's query port.")

@@ -18,7 +18,7 @@ from pydrake.systems.framework import (
 )
 
 from drake_affetto.common.errors import require
-from drake_affetto.common.systems import input_port, output_port
+from drake_affetto.common.systems import connect, input_port, output_port
 
 
 class DrumMicrophone(LeafSystem):
@@ -152,14 +152,7 @@ class DrumMicrophone(LeafSystem):
             X_BH=head_center.GetFixedPoseInBodyFrame(),
         )
         builder.AddNamedSystem(name, microphone)
-        builder.Connect(
-            plant.get_contact_results_output_port(),
-            microphone.get_contact_results_input_port(),
-        )
-        builder.Connect(
-            plant.get_body_poses_output_port(),
-            microphone.get_body_poses_input_port(),
-        )
+        connect(builder, plant, microphone, "contact_results", "body_poses")
         return microphone
 
     get_contact_results_input_port = input_port("The plant's contact results.")

@@ -28,6 +28,7 @@ from pydrake.systems.primitives import (
 from pydrake.systems.sensors import CameraInfo
 
 from drake_affetto.common.errors import require
+from drake_affetto.common.systems import connect
 from drake_affetto.control.pidf_controller import PidfController
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.motion.dmp_source import DmpSource
@@ -465,21 +466,17 @@ class AffettoStation(Diagram):
         self.dmp_source = DmpSource.AddToBuilder(
             builder=builder, dmp=dmp, num_joints=n
         )
-        builder.Connect(
-            self.gaze.get_task_parameter_output_port(),
-            self.policy.get_task_parameter_input_port(),
-        )
+        connect(builder, self.gaze, self.policy, "task_parameter")
         builder.Connect(
             self.gaze.get_ready_output_port(),
             self.policy.get_settled_input_port(),
         )
-        builder.Connect(
-            self.policy.get_policy_parameters_output_port(),
-            self.dmp_source.get_policy_parameters_input_port(),
-        )
-        builder.Connect(
-            self.policy.get_start_time_output_port(),
-            self.dmp_source.get_start_time_input_port(),
+        connect(
+            builder,
+            self.policy,
+            self.dmp_source,
+            "policy_parameters",
+            "start_time",
         )
         _export(
             builder,
@@ -540,10 +537,7 @@ class AffettoStation(Diagram):
             self._estimated_state,
             self.controller.get_estimated_state_input_port(),
         )
-        builder.Connect(
-            self.actuation.get_chamber_pressure_output_port(),
-            self.controller.get_chamber_pressure_input_port(),
-        )
+        connect(builder, self.actuation, self.controller, "chamber_pressure")
         builder.Connect(
             self._offset.get_output_port(),
             self.controller.get_equilibrium_offset_input_port(),

@@ -4,23 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.multibody.math import SpatialForce
-from pydrake.multibody.plant import (
-    ExternallyAppliedSpatialForce,
-    MultibodyPlant,
-)
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable
-from pydrake.systems.framework import (
-    BasicVector,
-    Context,
-    DiagramBuilder,
-    DiscreteValues,
-    LeafSystem,
-)
+from pydrake.systems.framework import Context, DiagramBuilder, DiscreteValues
 
 from drake_affetto.common.errors import require
-from drake_affetto.common.systems import input_port, output_port
+from drake_affetto.common.systems import input_port
 from drake_affetto.common.typing import Array
+from drake_affetto.teaching.hand_force import HandForce
 from drake_affetto.teaching.stroke import (
     Stroke,
     TeacherConfig,
@@ -31,7 +22,7 @@ from drake_affetto.teaching.stroke import (
 )
 
 
-class KinestheticTeacher(LeafSystem):
+class KinestheticTeacher(HandForce):
     """A simulated person who moves the robot's palm along a stroke.
 
     This is the kinesthetic teaching of the paper, Sec. V. The teacher grasps
@@ -100,18 +91,7 @@ class KinestheticTeacher(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=self._dt, offset_sec=0.0, update=self._update
         )
-        self.DeclareAbstractOutputPort(
-            name="spatial_force",
-            alloc=lambda: Value([ExternallyAppliedSpatialForce()]),
-            calc=self._calc_spatial_force,
-            prerequisites_of_calc={self.xd_ticket()},
-        )
-        self.DeclareVectorOutputPort(
-            name="pulling_force",
-            size=3,
-            calc=self._calc_pulling_force,
-            prerequisites_of_calc={self.xd_ticket()},
-        )
+        self._declare_outputs(self._body, {self.xd_ticket()})
 
     @staticmethod
     def AddToBuilder(
@@ -150,12 +130,6 @@ class KinestheticTeacher(LeafSystem):
 
     get_estimated_state_input_port = input_port(
         "Angles and rates of the n joints (2n), rad, rad/s."
-    )
-    get_spatial_force_output_port = output_port(
-        "The list for MultibodyPlant's applied_spatial_force."
-    )
-    get_pulling_force_output_port = output_port(
-        "Force on the palm (3), world frame, N."
     )
 
     def set_posture(self, q: Array) -> None:
@@ -259,19 +233,7 @@ class KinestheticTeacher(LeafSystem):
             ]
         )
 
-    def _calc_spatial_force(self, context: Context, output: Value) -> None:
+    def _pull(self, context: Context) -> tuple[Array, Array] | None:
+        """See base class."""
         memory = context.get_discrete_state(self._memory).value()
-        if memory[0] == 0.0:
-            output.set_value([])
-            return
-        force = ExternallyAppliedSpatialForce()
-        force.body_index = self._body.index()
-        force.p_BoBq_B = self._p_BoPalm
-        force.F_Bq_W = SpatialForce(tau=np.zeros(3), f=memory[13:16])
-        output.set_value([force])
-
-    def _calc_pulling_force(
-        self, context: Context, output: BasicVector
-    ) -> None:
-        memory = context.get_discrete_state(self._memory).value()
-        output.SetFromVector(memory[13:16])
+        return None if memory[0] == 0.0 else (self._p_BoPalm, memory[13:16])

@@ -5,25 +5,24 @@ from pydrake.common.value import Value
 from pydrake.geometry import Meshcat, SceneGraph
 from pydrake.lcm import DrakeLcm
 from pydrake.math import RigidTransform
-from pydrake.multibody.math import SpatialForce, SpatialVelocity
+from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import (
     ExternallyAppliedSpatialForce,
     MultibodyPlant,
 )
 from pydrake.systems.framework import (
-    BasicVector,
     Context,
     DiagramBuilder,
     DiscreteValues,
     InputPort,
-    LeafSystem,
     OutputPort,
     System,
 )
 
 from drake_affetto.common.errors import InputError
-from drake_affetto.common.systems import input_port, output_port
+from drake_affetto.common.systems import connect, input_port
 from drake_affetto.common.typing import Array
+from drake_affetto.teaching.hand_force import HandForce
 from drake_affetto.teaching.stroke import TeacherConfig
 
 # The field by which Drake offers its mouse spring.
@@ -41,7 +40,7 @@ def require_mouse_spring() -> None:
         )
 
 
-class MouseTeacher(LeafSystem):
+class MouseTeacher(HandForce):
     """Impedance of a teacher's arm, between the mouse and the robot's hand.
 
     Drake's mouse spring has three properties that do not suit teaching: it
@@ -91,7 +90,6 @@ class MouseTeacher(LeafSystem):
         config.check("teaching")
         self._config = config
         hand = plant.GetFrameByName(palm_frame).body()
-        self._hand = hand.index()
         # The mouse spring is as stiff, and critically damped for the hand.
         self._mouse_damping = (config.stiffness * hand.default_mass()) ** 0.5
         self._force_in = self.DeclareAbstractInputPort(
@@ -113,26 +111,9 @@ class MouseTeacher(LeafSystem):
             self._velocities_in.ticket(),
             self.xd_ticket(),
         }
-        self.DeclareAbstractOutputPort(
-            name="spatial_force",
-            alloc=lambda: Value([ExternallyAppliedSpatialForce()]),
-            calc=self._calc_spatial_force,
-            prerequisites_of_calc=needed,
-        )
-        self.DeclareVectorOutputPort(
-            name="pulling_force",
-            size=3,
-            calc=self._calc_pulling_force,
-            prerequisites_of_calc=needed,
-        )
+        self._declare_outputs(hand, needed)
 
     get_mouse_force_input_port = input_port("Forces of Drake's mouse spring.")
-    get_spatial_force_output_port = output_port(
-        "The list for MultibodyPlant's applied_spatial_force."
-    )
-    get_pulling_force_output_port = output_port(
-        "Force on the hand (3), world frame, N."
-    )
 
     @staticmethod
     def AddToBuilder(
@@ -195,10 +176,9 @@ class MouseTeacher(LeafSystem):
             name, MouseTeacher(plant, config, palm_frame)
         )
         builder.Connect(spring, teacher.get_mouse_force_input_port())
-        for name in ("body_poses", "body_spatial_velocities"):
-            builder.Connect(
-                plant.GetOutputPort(name), teacher.GetInputPort(name)
-            )
+        connect(
+            builder, plant, teacher, "body_poses", "body_spatial_velocities"
+        )
         builder.Connect(teacher.get_spatial_force_output_port(), port)
         return teacher
 
@@ -219,7 +199,7 @@ class MouseTeacher(LeafSystem):
             grip[1:] = drag.p_BoBq_B
 
     def _pull(self, context: Context) -> tuple[Array, Array] | None:
-        """Grasped point (3,), hand frame, m, and force (3,), world frame, N."""
+        """See base class."""
         drag = self._drag(context)
         if drag is None:
             return None
@@ -244,23 +224,6 @@ class MouseTeacher(LeafSystem):
         if size > config.max_force:
             force = force * (config.max_force / size)
         return held, force
-
-    def _calc_spatial_force(self, context: Context, output: Value) -> None:
-        pull = self._pull(context)
-        if pull is None:
-            output.set_value([])
-            return
-        force = ExternallyAppliedSpatialForce()
-        force.body_index = self._hand
-        force.p_BoBq_B, f = pull
-        force.F_Bq_W = SpatialForce(tau=np.zeros(3), f=f)
-        output.set_value([force])
-
-    def _calc_pulling_force(
-        self, context: Context, output: BasicVector
-    ) -> None:
-        pull = self._pull(context)
-        output.SetFromVector(np.zeros(3) if pull is None else pull[1])
 
 
 def _source(
