@@ -23,7 +23,7 @@ from drake_affetto.pneumatics.chamber import (
     Row,
     line_slots,
     memory_size,
-    step_joints_flat,
+    step_joints,
 )
 from drake_affetto.pneumatics.parameters import (
     DEFAULT_FILE,
@@ -334,7 +334,7 @@ class PneumaticActuation(LeafSystem):
 
     def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
         mutable = discrete_state.get_mutable_value
-        step_joints_flat(
+        step_joints(
             self._time_step,
             self._mode,
             self._look_ahead,

@@ -423,7 +423,7 @@ def step_joints(
         mode: `FLOW_MODE` or `REGULATOR_MODE`.
         look_ahead: steps by which `joint_state` is to be extrapolated, to the
             angle at which the torque will act: 0 where it is that angle.
-        parameters: (ROWS, n), see `Row`.
+        parameters: (ROWS, n), see `Row`, or the same as one row, (ROWS · n).
         command: (n) openings, or (2n) pressures [p_a; p_b] in Pa absolute.
         joint_state: (2n) [q; q̇] at the step's start, rad and rad/s.
         pressure: (2n) [p_a; p_b], Pa absolute; advanced.
@@ -432,6 +432,8 @@ def step_joints(
         memory: see `memory_size`; advanced. Where its first entry is 0 it is
             filled first: valves at rest, ambient temperature, friction at 0.
     """
+    # Here and not in Python, where even this counts a thousand times a second.
+    parameters = parameters.reshape(ROWS, parameters.size // ROWS)
     n = parameters.shape[1]
     mass = memory[_HEAD : _HEAD + 2 * n]
     spool = memory[_HEAD + 2 * n : _HEAD + 4 * n]
@@ -563,34 +565,3 @@ def step_joints(
         )
         angle[i] = q_next
         speed[i] = v
-
-
-@numba.njit(cache=True)
-def step_joints_flat(
-    h: float,
-    mode: int,
-    look_ahead: float,
-    parameters: NDArray[np.float64],
-    command: NDArray[np.float64],
-    joint_state: NDArray[np.float64],
-    pressure: NDArray[np.float64],
-    torque: NDArray[np.float64],
-    mass_flow: NDArray[np.float64],
-    memory: NDArray[np.float64],
-) -> None:
-    """`step_joints` with its parameters as one row, (ROWS · n).
-
-    A thousand times a second even the reshaping of an array in Python counts.
-    """
-    step_joints(
-        h,
-        mode,
-        look_ahead,
-        parameters.reshape(ROWS, parameters.size // ROWS),
-        command,
-        joint_state,
-        pressure,
-        torque,
-        mass_flow,
-        memory,
-    )

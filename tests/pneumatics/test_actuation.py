@@ -17,12 +17,7 @@ from drake_affetto.pneumatics.actuation import (
     PneumaticActuation,
     PneumaticActuationConfig,
 )
-from drake_affetto.pneumatics.chamber import (
-    FLOW_MODE,
-    Row,
-    memory_size,
-    step_joints,
-)
+from drake_affetto.pneumatics.chamber import Row
 from drake_affetto.pneumatics.parameters import (
     ActuatorClass,
     JointActuator,
@@ -31,7 +26,7 @@ from drake_affetto.pneumatics.parameters import (
     load_parameters,
     resting_pressure,
 )
-from support.actuator_bench import closed, make_parameters
+from support.actuator_bench import Actuators, closed, make_parameters
 
 N = 3
 
@@ -72,9 +67,9 @@ def test_updates_are_those_of_the_kernel():
     array = dut.get_parameters(context)
     random = np.random.default_rng(1)
     dut.set_pressures(context, [2e5, 3e5, 4e5], 2.5e5)
-    pressure = np.array([2e5, 3e5, 4e5, 2.5e5, 2.5e5, 2.5e5])
-    torque, flow = np.zeros(N), np.zeros(2 * N)
-    memory = np.zeros(memory_size(N, 0.001, 0.0))
+    kernel = Actuators(
+        array, [2e5, 3e5, 4e5, 2.5e5, 2.5e5, 2.5e5], max_dead_time=0.0
+    )
     simulator = Simulator(dut, context)
     for k in range(20):
         command = random.uniform(-1, 1, N)
@@ -82,22 +77,11 @@ def test_updates_are_those_of_the_kernel():
         dut.get_command_input_port().FixValue(context, command)
         dut.get_estimated_state_input_port().FixValue(context, state)
         simulator.AdvanceTo(0.001 * (k + 1))
-        step_joints(
-            0.001,
-            FLOW_MODE,
-            0.0,
-            array,
-            command,
-            state,
-            pressure,
-            torque,
-            flow,
-            memory,
-        )
+        kernel.step(command, state[:N], state[N:])
         for name, expected in (
-            ("chamber_pressure", pressure),
-            ("actuation", torque),
-            ("mass_flow", flow),
+            ("chamber_pressure", kernel.pressure),
+            ("actuation", kernel.torque),
+            ("mass_flow", kernel.mass_flow),
         ):
             found = dut.GetOutputPort(name).Eval(context)
             np.testing.assert_array_equal(found, expected)
