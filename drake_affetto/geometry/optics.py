@@ -48,8 +48,8 @@ def points_in_frame(X_WF: Array, p_W: Array) -> Array:
 
 
 @dataclasses.dataclass(frozen=True)
-class PinholeCamera:
-    """A camera without distortion.
+class _ImagePlane:
+    """Size and scale of an image, which every camera has.
 
     Attributes:
         width: image width [pixels].
@@ -67,16 +67,28 @@ class PinholeCamera:
     center_x: float
     center_y: float
 
+    @property
+    def image_center(self) -> Array:
+        """Pixel coordinates (2,) of the middle of the image."""
+        return np.array([0.5 * (self.width - 1), 0.5 * (self.height - 1)])
+
+
+@dataclasses.dataclass(frozen=True)
+class PinholeCamera(_ImagePlane):
+    """A camera without distortion.
+
+    Attributes:
+        width, height: size of the image, px.
+        focal_x, focal_y: focal lengths along u and v, px.
+        center_x, center_y: principal point from the image's left and upper
+            edge, px.
+    """
+
     @classmethod
     def from_fov(cls, width: int, height: int, fov_y: float) -> "PinholeCamera":
         """Square pixels and a central principal point; fov_y in rad."""
         focal = 0.5 * height / math.tan(0.5 * fov_y)
         return cls(width, height, focal, focal, 0.5 * width, 0.5 * height)
-
-    @property
-    def image_center(self) -> Array:
-        """Pixel coordinates (2,) of the middle of the image."""
-        return np.array([0.5 * (self.width - 1), 0.5 * (self.height - 1)])
 
     def inside(self, uv: Array, margin: float = 0.0) -> Mask:
         """Whether pixels uv (..., 2) are in the image.
@@ -129,7 +141,7 @@ class PinholeCamera:
 
 
 @dataclasses.dataclass(frozen=True)
-class FisheyeCamera:
+class FisheyeCamera(_ImagePlane):
     """A wide-angle lens: image radius grows with the angle from the axis.
 
     A ray at angle ϑ from the optical axis meets the image at the radius
@@ -140,12 +152,6 @@ class FisheyeCamera:
         k1, k2: coefficients of the radial polynomial.
     """
 
-    width: int
-    height: int
-    focal_x: float
-    focal_y: float
-    center_x: float
-    center_y: float
     k1: float = 0.0
     k2: float = 0.0
 
@@ -168,11 +174,6 @@ class FisheyeCamera:
             center_x=0.5 * width,
             center_y=0.5 * height,
         )
-
-    @property
-    def image_center(self) -> Array:
-        """Pixel coordinates (2,) of the middle of the image."""
-        return np.array([0.5 * (self.width - 1), 0.5 * (self.height - 1)])
 
     def _radius(self, theta: Array) -> Array:
         square = theta * theta

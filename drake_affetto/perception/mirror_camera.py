@@ -569,11 +569,4 @@ def _labels(query: Any, frame_id: FrameId) -> list[int]:
 
 
 def _camera_info(camera: PinholeCamera) -> CameraInfo:
-    return CameraInfo(
-        width=camera.width,
-        height=camera.height,
-        focal_x=camera.focal_x,
-        focal_y=camera.focal_y,
-        center_x=camera.center_x,
-        center_y=camera.center_y,
-    )
+    return CameraInfo(**dataclasses.asdict(camera))
