@@ -14,6 +14,7 @@ The compiled kernel is long, for a call in its loop would cost time.
 
 import dataclasses
 import math
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -32,7 +33,7 @@ from drake_affetto.pneumatics.chamber import (
 )
 from drake_affetto.pneumatics.flow import GAS_CONSTANT
 from drake_affetto.robot.control_law import initial_error_sum
-from drake_affetto.robot.log import RobotLog
+from drake_affetto.robot.log import JointCourse, RobotLog
 
 # Errors that weigh the same in the fit: of the angle, % of the range, and of
 # a pressure, kPa.
@@ -67,24 +68,12 @@ _DWELL = MASS_OFFSET + DWELL_OFFSET_PER_JOINT
 
 
 @dataclasses.dataclass(frozen=True)
-class Simulated:
-    """A simulated log, at the log's own times.
+class Simulated(JointCourse):
+    """A simulated log, at the log's own times, as the robot's sensors see it.
 
-    Attributes:
-        t: Time, (N,), s.
-        q: Joint angle as the robot's sensor measures it, (N,), %.
-        p_a: Pressure of chamber a with the sensor's offset, (N,), kPa gauge.
-        p_b: Pressure of chamber b with the sensor's offset, (N,), kPa gauge.
-        c_a: Commanded pressure of chamber a, (N,), kPa gauge.
-        c_b: Commanded pressure of chamber b, (N,), kPa gauge.
+    The angle is within 0 and 100 %, and the pressures have the sensors'
+    offsets.
     """
-
-    t: Array
-    q: Array
-    p_a: Array
-    p_b: Array
-    c_a: Array
-    c_b: Array
 
     def errors(self, log: RobotLog) -> Array:
         """Differences to the log, (N, 3): angle, %, and p_a and p_b, kPa."""
@@ -287,6 +276,16 @@ def _simulate(
     return out
 
 
+class _Setting(NamedTuple):
+    """Part of the kernel's arguments, as they are explained there."""
+
+    law: Array
+    delays: Array
+    closed_loop: bool
+    release: float
+    dwell: float
+
+
 class JointSimulator:
     """Simulates logs of one joint with given parameter values."""
 
@@ -348,9 +347,8 @@ class JointSimulator:
             ]
         )
         rows = int(np.searchsorted(log.t, until, side="right"))
-        return self._simulate(
-            values, log, slice(0, rows), law, delays, closed_loop, 0.0, 1.0
-        )
+        setting = _Setting(law, delays, closed_loop, release=0.0, dwell=1.0)
+        return self._simulate(values, log, slice(0, rows), setting)
 
     def window(
         self, values: dict[str, float], log: RobotLog, first: int, rows: int
@@ -372,27 +370,15 @@ class JointSimulator:
         delay = values["dead_time"]
         delays = np.array([delay, delay, 0.5, 1.0, _STEP])
         law = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.01])
-        return self._simulate(
-            values,
-            log,
-            slice(first, first + rows),
-            law,
-            delays,
-            False,
-            LEAD_IN,
-            dwell,
-        )
+        setting = _Setting(law, delays, False, LEAD_IN, dwell)
+        return self._simulate(values, log, slice(first, first + rows), setting)
 
     def _simulate(
         self,
         values: dict[str, float],
         log: RobotLog,
         rows: slice,
-        law: Array,
-        delays: Array,
-        closed_loop: bool,
-        release: float,
-        dwell: float,
+        setting: _Setting,
     ) -> Simulated:
         problem = self.problem
         angle_range = problem.angle_range
@@ -420,20 +406,17 @@ class JointSimulator:
             ],
             axis=1,
         )
+        start, later, _, _, step = setting.delays
         out = _simulate(  # type: ignore[call-arg]
             parameters,
             joint,
-            law,
-            delays,
-            closed_loop,
-            release,
-            dwell,
+            *setting,
             t,
             state,
             np.stack([log.c_a[rows], log.c_b[rows]], axis=1),
             np.stack([log.q_des[rows], log.dq_des[rows]], axis=1),
             *self._filter,
-            np.zeros(memory_size(1, delays[4], max(delays[0], delays[1]))),
+            np.zeros(memory_size(1, step, max(start, later))),
         )
         return Simulated(
             t=log.t[rows],

@@ -19,18 +19,33 @@ COMMAND_MAXIMUM = 255.0
 
 
 @dataclasses.dataclass(frozen=True)
-class RobotLog:
-    """One joint's part of a log; arrays have a value for each of N rows.
+class JointCourse:
+    """What a joint did; arrays have a value for each of N rows.
 
     Attributes:
-        name: Name of the file, without its suffix.
-        joint: Number of the joint in the log.
         t: Time from the first row, s.
         q: Raw joint angle, % of the range.
         p_a: Raw pressure of chamber a, kPa gauge.
         p_b: Raw pressure of chamber b, kPa gauge.
         c_a: Commanded pressure of chamber a, kPa gauge.
         c_b: Commanded pressure of chamber b, kPa gauge.
+    """
+
+    t: Array
+    q: Array
+    p_a: Array
+    p_b: Array
+    c_a: Array
+    c_b: Array
+
+
+@dataclasses.dataclass(frozen=True)
+class RobotLog(JointCourse):
+    """One joint's part of a log; arrays have a value for each of N rows.
+
+    Attributes:
+        name: Name of the file, without its suffix.
+        joint: Number of the joint in the log.
         q_des: Reference angle, %.
         dq_des: Reference velocity, %/s.
         q_filtered: Angle that the robot's controller used, %.
@@ -39,12 +54,6 @@ class RobotLog:
 
     name: str
     joint: int
-    t: Array
-    q: Array
-    p_a: Array
-    p_b: Array
-    c_a: Array
-    c_b: Array
     q_des: Array
     dq_des: Array
     q_filtered: Array
