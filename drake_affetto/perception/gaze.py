@@ -19,6 +19,7 @@ All state is one array of floats, so that it fits a discrete state vector;
 import dataclasses
 import enum
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -213,6 +214,24 @@ _NEAR = 0.15
 _KEPT_ONCE_LOOSE = 0.2
 
 
+class _Look(NamedTuple):
+    """One image and when it is taken in.
+
+    Attributes:
+        t: Time, s.
+        blob: x_img, y_img, found (3,).
+        q: The joint's angle when the image was exposed, rad.
+        t_image: Time of the exposure, s.
+        task: What the trial asks.
+    """
+
+    t: float
+    blob: Array
+    q: float
+    t_image: float
+    task: GazeTask
+
+
 class Gaze:
     """The gaze servo without ports.
 
@@ -291,10 +310,11 @@ class Gaze:
             x[YAW_GOAL], x[SPEED] = task.start_yaw, self.config.max_speed
             x[T_LAST], x[T_YAW] = -np.inf, t_image
             x[Q_LAST] = q
+        look = _Look(t, blob, q, t_image, task)
         if task.mode == GazeMode.FIXED_YAW:
-            self._look_from_fixed_yaw(x, t, blob, q, t_image, task)
+            self._look_from_fixed_yaw(x, look)
         else:
-            self._center(x, t, blob, q, t_image, task)
+            self._center(x, look)
         x[T_YAW], x[Q_LAST] = t_image, q
         if (
             x[PHASE] in (GazePhase.TRACK, GazePhase.SEARCH)
@@ -304,16 +324,9 @@ class Gaze:
 
     # Modes
 
-    def _look_from_fixed_yaw(
-        self,
-        x: Array,
-        t: float,
-        blob: Array,
-        q: float,
-        t_image: float,
-        task: GazeTask,
-    ) -> None:
+    def _look_from_fixed_yaw(self, x: Array, look: _Look) -> None:
         config = self.config
+        t, blob, q, t_image, task = look
         behind = task.fixed_yaw - q
         elapsed = t_image - x[T_YAW]
         if elapsed > 0:
@@ -329,9 +342,9 @@ class Gaze:
                 self._give_up(x, t, task)
             return
         x[MISSED] = 0
-        still = self._is_still(x, blob, t_image)
-        self._learn_image_gain(x, blob, q)
-        self._remember(x, blob, q, t_image)
+        still = self._is_still(x, look)
+        self._learn_image_gain(x, look)
+        self._remember(x, look)
         # Where the marker would be, were the joint exactly at the yaw.
         self._count(
             x,
@@ -342,16 +355,9 @@ class Gaze:
             blob[1] + x[SLOPE_Y] * behind,
         )
 
-    def _center(
-        self,
-        x: Array,
-        t: float,
-        blob: Array,
-        q: float,
-        t_image: float,
-        task: GazeTask,
-    ) -> None:
+    def _center(self, x: Array, look: _Look) -> None:
         config = self.config
+        t, blob, q, t_image, task = look
         if not blob[2] > 0.5:
             x[COUNT] = 0
             x[MISSED] += 1
@@ -365,9 +371,9 @@ class Gaze:
             x[PHASE] = GazePhase.TRACK
             x[T_LAST] = -np.inf
         x[MISSED] = 0
-        still = self._is_still(x, blob, t_image)
+        still = self._is_still(x, look)
         error = blob[0] - self.view.center_x
-        self._learn_image_gain(x, blob, q)
+        self._learn_image_gain(x, look)
         # Turning left (+) moves the marker right: too far right, turn right.
         way = -math.atan(error / self.view.focal) / x[IMAGE_GAIN]
         centered = abs(error) <= config.tolerance * self.view.width
@@ -375,7 +381,7 @@ class Gaze:
         if math.isfinite(x[T_LAST]):
             elapsed = t_image - x[T_LAST]
             self._overcome_friction(x, way, elapsed, still)
-        self._remember(x, blob, q, t_image)
+        self._remember(x, look)
         step = config.gain * way if not centered else way
         self._go_to(x, t, task, q + step + x[OFFSET], config.max_speed)
         # Both as they would be, were the marker exactly in the middle.
@@ -384,12 +390,14 @@ class Gaze:
 
     # Steps
 
-    def _remember(self, x: Array, blob: Array, q: float, t: float) -> None:
-        x[T_LAST], x[X_LAST], x[Y_LAST], x[Q_SEEN] = t, blob[0], blob[1], q
+    def _remember(self, x: Array, look: _Look) -> None:
+        x[T_LAST], x[Q_SEEN] = look.t_image, look.q
+        x[X_LAST], x[Y_LAST] = look.blob[0], look.blob[1]
 
-    def _is_still(self, x: Array, blob: Array, t: float) -> bool:
+    def _is_still(self, x: Array, look: _Look) -> bool:
         """Whether the marker moved little since the image before."""
-        elapsed = t - x[T_LAST]
+        blob = look.blob
+        elapsed = look.t_image - x[T_LAST]
         if not 0 < elapsed < 1.0:
             return False
         dx = blob[0] - x[X_LAST]
@@ -397,9 +405,10 @@ class Gaze:
         speed = math.hypot(dx, dy) / elapsed / self.view.width
         return speed <= self.config.still
 
-    def _learn_image_gain(self, x: Array, blob: Array, q: float) -> None:
+    def _learn_image_gain(self, x: Array, look: _Look) -> None:
         """Learns what a turn does to the image from a turn that was clear."""
-        turn = q - x[Q_SEEN]
+        blob = look.blob
+        turn = look.q - x[Q_SEEN]
         if not math.isfinite(x[T_LAST]) or abs(turn) < 0.02:
             return
         focal, center = self.view.focal, self.view.center_x

@@ -1,5 +1,6 @@
 """The system that turns the upper body to the marker and takes τ."""
 
+import dataclasses
 import math
 from typing import Any
 
@@ -202,26 +203,22 @@ class GazeServo(LeafSystem):
 
     def set_enabled(self, context: Context, enabled: bool) -> None:
         """Whether to look at all (not, while teaching or replaying)."""
-        task = self.task(context)
-        task.enabled = bool(enabled)
-        self.set_task(context, task)
+        self._change_task(context, enabled=bool(enabled))
 
     def set_mode(self, context: Context, mode: GazeMode) -> None:
         """Center the marker, or look from a fixed yaw."""
-        task = self.task(context)
-        task.mode = GazeMode(mode)
-        self.set_task(context, task)
+        self._change_task(context, mode=GazeMode(mode))
 
     def set_fixed_yaw(self, context: Context, yaw: float) -> None:
         """The yaw [rad] to look from in the mode FIXED_YAW."""
-        task = self.task(context)
-        task.fixed_yaw = float(yaw)
-        self.set_task(context, task)
+        self._change_task(context, fixed_yaw=float(yaw))
 
     def set_start_yaw(self, context: Context, yaw: float) -> None:
         """The yaw [rad] of the start posture."""
-        task = self.task(context)
-        task.start_yaw = float(yaw)
+        self._change_task(context, start_yaw=float(yaw))
+
+    def _change_task(self, context: Context, **changes: Any) -> None:
+        task = dataclasses.replace(self.task(context), **changes)
         self.set_task(context, task)
 
     def reset(self, context: Context) -> None:
