@@ -1,7 +1,5 @@
 """What touches what, how softly, and that geometry follows the drum."""
 
-from types import SimpleNamespace
-
 import numpy as np
 from pydrake.geometry import (
     ClippingRange,
@@ -19,6 +17,7 @@ import pytest
 
 from drake_affetto.geometry.kinematics import solve_position
 from drake_affetto.scene import world
+from support.drumming_scene import build_scene
 
 ARM = [
     "right_shoulder_abduction",
@@ -32,26 +31,12 @@ XY = [0.24, -0.10]
 @pytest.fixture(scope="module")
 def still_scene():
     """Steps so short that nothing moves while contact is resolved."""
-    builder = DiagramBuilder()
-    plant, _ = AddMultibodyPlant(
-        MultibodyPlantConfig(
-            time_step=1e-5,
-            contact_model="point",
-            discrete_contact_approximation="lagged",
-            use_sampled_output_ports=False,
-        ),
-        builder,
+    scene = build_scene(1e-5)
+    robot = scene.plant.GetModelInstanceByName("affetto")
+    scene.plant.get_actuation_input_port(robot).FixValue(
+        scene.context, np.zeros(22)
     )
-    world.add_world(plant, world.WorldConfig())
-    plant.Finalize()
-    diagram = builder.Build()
-    root = diagram.CreateDefaultContext()
-    context = plant.GetMyMutableContextFromRoot(root)
-    robot = plant.GetModelInstanceByName("affetto")
-    plant.get_actuation_input_port(robot).FixValue(context, np.zeros(22))
-    return SimpleNamespace(
-        diagram=diagram, plant=plant, root=root, context=context
-    )
+    return scene
 
 
 @pytest.fixture

@@ -7,16 +7,7 @@ import pytest
 from drake_affetto.common.errors import InputError
 from drake_affetto.scene import world
 
-ACTIVE = [
-    "waist_roll",
-    "waist_pitch",
-    "waist_yaw",
-    "right_shoulder_elevation",
-    "right_shoulder_abduction",
-    "right_shoulder_flexion",
-    "right_elbow_rotation",
-    "right_elbow_flexion",
-]
+ACTIVE = list(world.ACTIVE_JOINTS)
 
 
 def test_the_drum_stands_where_it_is_put(scene):

@@ -26,13 +26,12 @@ class Scene:
         self.diagram.SetDefaultContext(self.root)
 
 
-@pytest.fixture(scope="session")
-def built_scene() -> Scene:
+def build_scene(time_step: float) -> Scene:
+    """A plant whose contact results are asked for without stepping."""
     builder = DiagramBuilder()
-    # Contact results are asked for without stepping.
     plant, scene_graph = AddMultibodyPlant(
         MultibodyPlantConfig(
-            time_step=0.001,
+            time_step=time_step,
             contact_model="point",
             discrete_contact_approximation="lagged",
             use_sampled_output_ports=False,
@@ -45,6 +44,11 @@ def built_scene() -> Scene:
     root = diagram.CreateDefaultContext()
     context = plant.GetMyMutableContextFromRoot(root)
     return Scene(diagram, plant, scene_graph, root, context)
+
+
+@pytest.fixture(scope="session")
+def built_scene() -> Scene:
+    return build_scene(0.001)
 
 
 @pytest.fixture

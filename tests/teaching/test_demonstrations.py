@@ -1,6 +1,7 @@
 """The file of demonstrations: what goes in comes out, or is refused."""
 
 from concurrent.futures import ProcessPoolExecutor
+import dataclasses
 import multiprocessing
 import os
 from pathlib import Path
@@ -29,16 +30,11 @@ ROOT = Path(__file__).parents[2]
 LOG = ROOT.parent / "shared/data/affetto-logs/kinesthetic_000.csv"
 JOINTS = ("waist_roll", "waist_pitch", "right_elbow_flexion")
 ARRAYS = ("t", "q", "drum_xy", "theta", "task_parameter", "prototype")
-PLAIN = (
-    "joint_names",
-    "seed",
-    "attempt",
-    "reward",
-    "max_pull",
-    "teacher",
-    "scenario",
-    "version",
-)
+PLAIN = [
+    field.name
+    for field in dataclasses.fields(Demonstration)
+    if field.name not in ARRAYS
+]
 
 
 def make(seed=0, **changes) -> Demonstration:
