@@ -9,6 +9,7 @@ predictions for each Jacobian.
 """
 
 from collections.abc import Callable
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -29,10 +30,11 @@ from drake_affetto.skill.mappings import Domain
 Evaluate = Callable[[Array], tuple[Array, Array]]
 
 
+@dataclasses.dataclass(eq=False)
 class SourceModel:
     """A fitted regressor as the pair of its predictions and their Jacobian.
 
-    Args:
+    Attributes:
         evaluate: Z (M, d) to ŷ (M, F) and ∂ŷ/∂z (M, F, d).
         n_in: d.
         n_out: F.
@@ -40,19 +42,11 @@ class SourceModel:
         flat: whether the regressor predicts (M,) rather than (M, 1).
     """
 
-    def __init__(
-        self,
-        evaluate: Evaluate,
-        n_in: int,
-        n_out: int,
-        exact: bool = True,
-        flat: bool = False,
-    ) -> None:
-        self.evaluate = evaluate
-        self.n_in = n_in
-        self.n_out = n_out
-        self.exact = exact
-        self.flat = flat
+    evaluate: Evaluate
+    n_in: int
+    n_out: int
+    exact: bool = True
+    flat: bool = False
 
     def project(self, matrix: Array) -> "SourceModel":
         """The model of ŷ · matrix, for a matrix (F, r)."""
