@@ -14,10 +14,8 @@ from drake_affetto.perception.gaze import (
     GazeMode,
     GazePhase,
     GazeTask,
-    GazeView,
 )
-
-VIEW = GazeView(center_x=0.5, width=1.0, height_per_width=0.75, focal=0.8)
+from support.gaze_view import VIEW, x_img_at
 
 
 class Joint:
@@ -81,7 +79,7 @@ def simulate(
         t = 0.001 * k
         if k % round(1000 / rate) == 0 and servo.wants_image(x, task):
             images += 1
-            x_img = 0.5 + 0.8 * math.tan(turns * (joint.q - marker))
+            x_img = x_img_at(turns * (joint.q - marker))
             found = visible(t, x_img)
             blob = (
                 np.array([x_img, 0.3, 1.0])
@@ -200,7 +198,7 @@ def test_from_a_fixed_yaw_the_image_is_the_task_parameter():
     run = fixed(0.35)
     assert run.phase == GazePhase.SETTLED
     # The joint comes to the yaw within the tolerance, so that x_img does.
-    expected = 0.5 + 0.8 * math.tan(1.25 * 0.15)
+    expected = x_img_at(1.25 * 0.15)
     assert run.tau[0] == pytest.approx(expected, abs=0.02)
     assert run.tau[1] == pytest.approx(0.3, abs=0.003)
     # It did not take the still image before the joint began to move.
@@ -230,7 +228,7 @@ def test_ready_waits_for_the_command_to_be_back():
     for k in range(20):
         t = 0.1 * k
         q = servo.yaw_command(x, t, task)
-        blob = np.array([0.5 + 0.8 * math.tan(q - 0.4), 0.3, 1.0])
+        blob = np.array([x_img_at(q - 0.4), 0.3, 1.0])
         servo.update(x, t, blob, q, t, task)
         if servo.is_settled(x, task):
             break
@@ -253,4 +251,4 @@ def test_bad_settings_are_named():
     with pytest.raises(InputError, match=r"gaze\.yaw_max"):
         Gaze(GazeConfig(yaw_min=0.2, yaw_max=0.1), VIEW)
     with pytest.raises(InputError, match=r"gaze view\.focal"):
-        Gaze(GazeConfig(), GazeView(focal=0.0))
+        Gaze(GazeConfig(), dataclasses.replace(VIEW, focal=0.0))

@@ -1,7 +1,5 @@
 """The gaze servo's ports, events and parameters."""
 
-import math
-
 import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
@@ -16,11 +14,10 @@ from drake_affetto.perception.gaze import (
     GazeMode,
     GazePhase,
     GazeTask,
-    GazeView,
 )
 from drake_affetto.perception.gaze_servo import GazeServo, gaze_view
+from support.gaze_view import VIEW, x_img_at
 
-VIEW = GazeView(center_x=0.5, width=1.0, height_per_width=0.75, focal=0.8)
 MARKER = 0.25
 
 
@@ -41,7 +38,7 @@ class Eye(LeafSystem):
     def _calc(self, context, output):
         self.looks.append(context.get_time())
         q = self._yaw.Eval(context)[1]
-        x = 0.5 + 0.8 * math.tan(q - MARKER)
+        x = x_img_at(q - MARKER)
         output.SetFromVector([x, 0.4, 1.0])
 
 
@@ -140,9 +137,7 @@ def test_fixed_yaw_gives_the_image_coordinates():
     task = GazeTask(mode=GazeMode.FIXED_YAW, fixed_yaw=0.4)
     sub = run(diagram, servo, task)
     tau = servo.get_task_parameter_output_port().Eval(sub)
-    np.testing.assert_allclose(
-        tau, [0.5 + 0.8 * math.tan(0.15), 0.4], atol=0.01
-    )
+    np.testing.assert_allclose(tau, [x_img_at(0.15), 0.4], atol=0.01)
 
 
 def test_setters_change_one_thing_each():

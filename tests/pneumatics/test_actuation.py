@@ -19,14 +19,16 @@ from drake_affetto.pneumatics.actuation import (
 )
 from drake_affetto.pneumatics.chamber import Row
 from drake_affetto.pneumatics.parameters import (
-    ActuatorClass,
-    JointActuator,
-    PneumaticParameters,
     chamber_volumes,
     load_parameters,
     resting_pressure,
 )
-from support.actuator_bench import Actuators, closed, make_parameters
+from support.actuator_bench import (
+    Actuators,
+    closed,
+    make_parameters,
+    one_joint,
+)
 
 N = 3
 
@@ -357,18 +359,14 @@ def test_stiction_holds_while_the_pressure_difference_moves_by_60_kpa():
 
 def test_parameters_may_be_values_instead_of_files():
     """For joints that no file of this repository knows."""
-    air = PneumaticParameters(
-        classes={"small": ActuatorClass()},
-        joints={"elbow": JointActuator("small")},
-    )
     builder = DiagramBuilder()
     system = PneumaticActuation.AddToBuilder(
         builder=builder,
         config=PneumaticActuationConfig(),
-        joint_names=["elbow"],
+        joint_names=["joint"],
         q_lower=[-1.0],
         q_upper=[1.0],
-        parameters=air,
+        parameters=one_joint(),
         name="air",
     )
     diagram = builder.Build()

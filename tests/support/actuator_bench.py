@@ -18,8 +18,8 @@ Q_LOWER, Q_UPPER = -1.0, 1.0
 ATMOSPHERE, SUPPLY = 101.3e3, 659.3e3
 
 
-def make_parameters(n=1, *, exponent=1.2, q=(Q_LOWER, Q_UPPER), **fields):
-    """(ROWS, n): n equal joints, without friction and dead time by default."""
+def one_joint(*, exponent=1.2, **fields):
+    """Parameters of "joint", without friction and dead time by default."""
     values = {
         "area_ratio": 1.0,
         "coulomb_torque": 0.0,
@@ -27,13 +27,18 @@ def make_parameters(n=1, *, exponent=1.2, q=(Q_LOWER, Q_UPPER), **fields):
         "dead_time": 0.0,
         **fields,
     }
-    parameters = PneumaticParameters(
+    return PneumaticParameters(
         supply_pressure=SUPPLY,
         atmospheric_pressure=ATMOSPHERE,
         polytropic_exponent=exponent,
         classes={"test": ActuatorClass(**values)},
         joints={"joint": JointActuator(actuator="test")},
     )
+
+
+def make_parameters(n=1, *, exponent=1.2, q=(Q_LOWER, Q_UPPER), **fields):
+    """(ROWS, n): n equal joints as `one_joint` has it."""
+    parameters = one_joint(exponent=exponent, **fields)
     return parameters.for_joints(
         ["joint"] * n, np.full(n, q[0]), np.full(n, q[1])
     )
