@@ -81,6 +81,12 @@ def check_ranges(obj: Any, where: str = "") -> None:
             continue
         if field.metadata["help"]:
             name = option_name(field)
-        for each in value if isinstance(value, (tuple, list)) else (value,):
-            if each is not None:
+        # Several numbers, or none, only where the default says so.
+        several = field.default is dataclasses.MISSING or isinstance(
+            field.default, tuple
+        )
+        if not (several and isinstance(value, (tuple, list))):
+            value = (value,)
+        for each in value:
+            if each is not None or field.default is not None:
                 require_range(name, each, *field.metadata["range"])

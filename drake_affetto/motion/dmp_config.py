@@ -4,8 +4,8 @@ import dataclasses
 
 from drake_affetto.common.errors import (
     require,
-    require_range,
 )
+from drake_affetto.common.fields import check_ranges, number
 
 
 @dataclasses.dataclass
@@ -34,13 +34,13 @@ class DmpConfig:
     """
 
     n_basis: int = 15
-    duration: float = 3.0
-    stiffness: float = 100.0
-    damping: float | None = None
-    width: float = 0.7
+    duration: float = number(3.0, 1e-3, 1e6)
+    stiffness: float = number(100.0, 1e-6, 1e8)
+    damping: float | None = number(None, 1e-6, 1e6)
+    width: float = number(0.7, 0.2, 5.0)
     method: str = "trajectory"
-    ridge: float = 1e-6
-    smoothing: float = 0.05
+    ridge: float = number(1e-6, 0.0, 1e6)
+    smoothing: float = number(0.05, 1e-6, 10.0)
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that does not fit."""
@@ -50,16 +50,10 @@ class DmpConfig:
             self.n_basis,
             "a whole number from 2 to 1000",
         )
-        require_range(f"{where}.duration", self.duration, 1e-3, 1e6)
-        require_range(f"{where}.stiffness", self.stiffness, 1e-6, 1e8)
-        if self.damping is not None:
-            require_range(f"{where}.damping", self.damping, 1e-6, 1e6)
-        require_range(f"{where}.width", self.width, 0.2, 5.0)
+        check_ranges(self, where)
         require(
             self.method in ("trajectory", "forcing"),
             f"{where}.method",
             self.method,
             "'trajectory' or 'forcing'",
         )
-        require_range(f"{where}.ridge", self.ridge, 0.0, 1e6)
-        require_range(f"{where}.smoothing", self.smoothing, 1e-6, 10.0)

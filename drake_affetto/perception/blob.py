@@ -15,7 +15,9 @@ import cv2
 import numpy as np
 
 from drake_affetto.common.errors import InputError, require, require_range
+from drake_affetto.common.fields import check_ranges, number
 from drake_affetto.common.typing import Array, Image
+from drake_affetto.perception.config import require_vector
 
 
 @dataclasses.dataclass
@@ -124,12 +126,12 @@ class BlobConfig:
     color: list[float] = dataclasses.field(
         default_factory=lambda: [0.05, 0.75, 0.15]
     )
-    hue_tolerance: float = 24.0
-    chroma: float = 0.4
-    min_area: float = 12.0
-    max_area: float = 0.2
-    min_fill: float = 0.7
-    max_aspect: float = 6.0
+    hue_tolerance: float = number(24.0, 1.0, 90.0)
+    chroma: float = number(0.4, 0.05, 1.0)
+    min_area: float = number(12.0, 3.0, 1e5)
+    max_area: float = number(0.2, 1e-4, 1.0)
+    min_fill: float = number(0.7, 0.0, 1.0)
+    max_aspect: float = number(6.0, 1.0, 100.0)
     region: list[float] = dataclasses.field(
         default_factory=lambda: [0.0, 0.0, 1.0, 1.0]
     )
@@ -141,13 +143,8 @@ class BlobConfig:
 
     def check(self, where: str) -> None:
         """Raises InputError if a value is out of range."""
-        for name, size in (("color", 3), ("region", 4)):
-            value = getattr(self, name)
-            require(
-                len(value) == size, f"{where}.{name}", value, f"{size} numbers"
-            )
-            for index, number in enumerate(value):
-                require_range(f"{where}.{name}[{index}]", number, 0.0, 1.0)
+        require_vector(f"{where}.color", self.color, 3, 0.0, 1.0)
+        require_vector(f"{where}.region", self.region, 4, 0.0, 1.0)
         left, upper, right, lower = self.region
         require(
             left < right and upper < lower,
@@ -162,12 +159,7 @@ class BlobConfig:
             self.color,
             "a color that is told from gray (Lab chroma of at least 20)",
         )
-        require_range(f"{where}.hue_tolerance", self.hue_tolerance, 1.0, 90.0)
-        require_range(f"{where}.chroma", self.chroma, 0.05, 1.0)
-        require_range(f"{where}.min_area", self.min_area, 3.0, 1e5)
-        require_range(f"{where}.max_area", self.max_area, 1e-4, 1.0)
-        require_range(f"{where}.min_fill", self.min_fill, 0.0, 1.0)
-        require_range(f"{where}.max_aspect", self.max_aspect, 1.0, 100.0)
+        check_ranges(self, where)
         require(
             self.detector in ("moments", "simple"),
             f"{where}.detector",

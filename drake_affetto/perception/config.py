@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from drake_affetto.common.errors import require, require_range
+from drake_affetto.common.fields import check_ranges, number
 from drake_affetto.geometry.optics import (
     Camera,
     FisheyeCamera,
@@ -36,8 +37,8 @@ def require_vector(
     """Raises InputError unless `value` is `size` numbers in [low, high]."""
     fits = isinstance(value, (list, tuple)) and len(value) == size
     require(fits, field, value, f"{size} numbers")
-    for index, number in enumerate(value):
-        require_range(f"{field}[{index}]", number, low, high)
+    for index, entry in enumerate(value):
+        require_range(f"{field}[{index}]", entry, low, high)
 
 
 def rotation_matrix(rpy: list[float]) -> np.ndarray:
@@ -61,13 +62,12 @@ class LensConfig:
         k2: second coefficient of the radial polynomial.
     """
 
-    k1: float = 0.0
-    k2: float = 0.0
+    k1: float = number(0.0, -0.2, 1.0)
+    k2: float = number(0.0, -0.1, 1.0)
 
     def check(self, where: str) -> None:
         """Raises InputError if a value is out of range."""
-        require_range(f"{where}.k1", self.k1, -0.2, 1.0)
-        require_range(f"{where}.k2", self.k2, -0.1, 1.0)
+        check_ranges(self, where)
 
 
 @dataclasses.dataclass
@@ -97,14 +97,14 @@ class CameraConfig:
     frame: str = "affetto::eye_camera"
     translation: list[float] = dataclasses.field(default_factory=_zeros)
     rotation: list[float] = dataclasses.field(default_factory=_zeros)
-    width: int = 320
-    height: int = 240
-    fov_y: float = 0.8188
+    width: int = number(320, 16, 4096)
+    height: int = number(240, 16, 4096)
+    fov_y: float = number(0.8188, 0.05, 2.6)
     lens: LensConfig | None = None
-    near: float = 0.05
-    far: float = 5.0
-    rate: float = 10.0
-    latency: float = 0.05
+    near: float = number(0.05, 1e-3, 1.0)
+    far: float = number(5.0, 0.1, 100.0)
+    rate: float = number(10.0, 0.5, 200.0)
+    latency: float = number(0.05, 0.0, 1.0)
     effects: ImageEffects = dataclasses.field(default_factory=ImageEffects)
     renderer: str = "vtk"
 
@@ -112,15 +112,8 @@ class CameraConfig:
         """Raises InputError if a value is out of range."""
         require_vector(f"{where}.translation", self.translation, 3, -1, 1)
         require_vector(f"{where}.rotation", self.rotation, 3, -4, 4)
-        require_range(f"{where}.width", self.width, 16, 4096)
-        require_range(f"{where}.height", self.height, 16, 4096)
-        require_range(f"{where}.fov_y", self.fov_y, 0.05, 2.6)
-        require_range(f"{where}.near", self.near, 1e-3, 1.0)
-        require_range(f"{where}.far", self.far, 0.1, 100.0)
-        require_range(f"{where}.rate", self.rate, 0.5, 200.0)
-        require_range(f"{where}.latency", self.latency, 0.0, 1.0)
+        check_ranges(self, where)
         if self.lens is not None:
-            self.lens.check(f"{where}.lens")
             corner = np.array([-0.5, -0.5])
             model = self.model()
             ray = model.direction(corner)

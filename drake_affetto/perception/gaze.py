@@ -23,7 +23,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from drake_affetto.common.errors import require, require_range
+from drake_affetto.common.errors import require
+from drake_affetto.common.fields import check_ranges, number
 from drake_affetto.common.typing import Array
 
 
@@ -74,42 +75,25 @@ class GazeConfig:
             going back to the start posture.
     """
 
-    gain: float = 1.0
-    integral_gain: float = 1.2
-    integral_limit: float = 0.15
-    image_gain: float = 1.0
-    max_speed: float = 0.8
-    search_speed: float = 0.5
-    yaw_min: float = -0.5
-    yaw_max: float = 0.5
-    tolerance: float = 0.01
-    still: float = 0.06
-    settled_frames: int = 4
-    near_yaw: float = 0.012
-    lost_frames: int = 3
-    timeout: float = 8.0
+    gain: float = number(1.0, 0.05, 2.0)
+    integral_gain: float = number(1.2, 0.0, 20.0)
+    integral_limit: float = number(0.15, 0.0, 1.0)
+    image_gain: float = number(1.0, 0.1, 5.0)
+    max_speed: float = number(0.8, 0.01, 20.0)
+    search_speed: float = number(0.5, 0.01, 20.0)
+    yaw_min: float = number(-0.5, -math.pi, math.pi)
+    yaw_max: float = number(0.5, -math.pi, math.pi)
+    tolerance: float = number(0.01, 1e-4, 0.5)
+    still: float = number(0.06, 1e-4, 10.0)
+    settled_frames: int = number(4, 1, 50)
+    near_yaw: float = number(0.012, 1e-3, 1.0)
+    lost_frames: int = number(3, 1, 100)
+    timeout: float = number(8.0, 0.5, 600.0)
     keep_yaw: bool = False
 
     def check(self, where: str) -> None:
         """Raises InputError if a value is out of range."""
-        ranges = {
-            "gain": (0.05, 2.0),
-            "integral_gain": (0.0, 20.0),
-            "integral_limit": (0.0, 1.0),
-            "image_gain": (0.1, 5.0),
-            "max_speed": (0.01, 20.0),
-            "search_speed": (0.01, 20.0),
-            "yaw_min": (-math.pi, math.pi),
-            "yaw_max": (-math.pi, math.pi),
-            "tolerance": (1e-4, 0.5),
-            "still": (1e-4, 10.0),
-            "settled_frames": (1, 50),
-            "near_yaw": (1e-3, 1.0),
-            "lost_frames": (1, 100),
-            "timeout": (0.5, 600.0),
-        }
-        for name, (low, high) in ranges.items():
-            require_range(f"{where}.{name}", getattr(self, name), low, high)
+        check_ranges(self, where)
         require(
             self.yaw_min < self.yaw_max,
             f"{where}.yaw_max",
@@ -129,19 +113,14 @@ class GazeView:
         focal: focal length in units of x_img.
     """
 
-    center_x: float = 0.5
-    width: float = 1.0
-    height_per_width: float = 0.75
-    focal: float = 0.8
+    center_x: float = number(0.5, -100, 100)
+    width: float = number(1.0, 1e-3, 1e3)
+    height_per_width: float = number(0.75, 1e-3, 1e3)
+    focal: float = number(0.8, 1e-3, 1e4)
 
     def check(self, where: str) -> None:
         """Raises InputError if a value is out of range."""
-        require_range(f"{where}.center_x", self.center_x, -100, 100)
-        require_range(f"{where}.width", self.width, 1e-3, 1e3)
-        require_range(
-            f"{where}.height_per_width", self.height_per_width, 1e-3, 1e3
-        )
-        require_range(f"{where}.focal", self.focal, 1e-3, 1e4)
+        check_ranges(self, where)
 
 
 @dataclasses.dataclass

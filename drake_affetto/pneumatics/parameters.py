@@ -14,6 +14,7 @@ from drake_affetto.common.errors import (
     require_array,
     require_range,
 )
+from drake_affetto.common.fields import check_ranges, number
 from drake_affetto.pneumatics.chamber import (
     ROWS,
     Row,
@@ -53,58 +54,36 @@ class ActuatorClass:
         dwell_recovery: time in which it returns, s; 0: it does not.
     """
 
-    torque_constant: float = 5e-6
-    area_ratio: float = 0.95
-    dead_volume: float = 12e-6
-    fill_conductance: float = 0.077e-8
-    exhaust_conductance: float = 0.028e-8
-    leak_conductance: float = 0.0
-    critical_ratio: float = 0.3
-    underlap: float = 0.02
-    valve_lag: float = 0.016
-    dead_time: float = 0.015
-    regulator_gain: float = 9.6e-6
-    coulomb_torque: float = 0.075
+    torque_constant: float = number(5e-6, 0.0, math.inf)
+    area_ratio: float = number(0.95, 0.0, math.inf)
+    dead_volume: float = number(12e-6, 0.0, math.inf)
+    fill_conductance: float = number(0.077e-8, 0.0, math.inf)
+    exhaust_conductance: float = number(0.028e-8, 0.0, math.inf)
+    leak_conductance: float = number(0.0, 0.0, math.inf)
+    critical_ratio: float = number(0.3, 0.0, 0.99)
+    underlap: float = number(0.02, -0.9, 0.9)
+    valve_lag: float = number(0.016, 0.0, 1.0)
+    dead_time: float = number(0.015, 0.0, 1.0)
+    regulator_gain: float = number(9.6e-6, 0.0, math.inf)
+    coulomb_torque: float = number(0.075, 0.0, math.inf)
     breakaway_torque: float = 0.15
-    stribeck_velocity: float = 0.05
-    bristle_deflection: float = 2e-3
-    bristle_relaxation: float = 2e-3
-    dwell_torque: float = 0.0
-    dwell_travel: float = 4.0
-    dwell_recovery: float = 0.0
+    stribeck_velocity: float = number(0.05, 1e-4, math.inf)
+    bristle_deflection: float = number(2e-3, 1e-6, 0.1)
+    bristle_relaxation: float = number(2e-3, 0.0, math.inf)
+    dwell_torque: float = number(0.0, 0.0, math.inf)
+    dwell_travel: float = number(4.0, 1e-3, math.inf)
+    dwell_recovery: float = number(0.0, 0.0, math.inf)
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that cannot be."""
+        check_ranges(self, where)
         for field in ("torque_constant", "area_ratio", "dead_volume"):
             value = getattr(self, field)
-            require_range(f"{where}.{field}", value, 0.0)
             require(value > 0.0, f"{where}.{field}", value, "a number above 0")
-        for field in (
-            "fill_conductance",
-            "exhaust_conductance",
-            "leak_conductance",
-            "regulator_gain",
-            "coulomb_torque",
-            "bristle_relaxation",
-            "dwell_torque",
-            "dwell_recovery",
-        ):
-            require_range(f"{where}.{field}", getattr(self, field), 0.0)
-        require_range(f"{where}.critical_ratio", self.critical_ratio, 0.0, 0.99)
-        require_range(f"{where}.underlap", self.underlap, -0.9, 0.9)
-        require_range(f"{where}.valve_lag", self.valve_lag, 0.0, 1.0)
-        require_range(f"{where}.dead_time", self.dead_time, 0.0, 1.0)
         require_range(
             f"{where}.breakaway_torque",
             self.breakaway_torque,
             self.coulomb_torque,
-        )
-        require_range(
-            f"{where}.stribeck_velocity", self.stribeck_velocity, 1e-4
-        )
-        require_range(f"{where}.dwell_travel", self.dwell_travel, 1e-3)
-        require_range(
-            f"{where}.bristle_deflection", self.bristle_deflection, 1e-6, 0.1
         )
 
 

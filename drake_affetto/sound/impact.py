@@ -16,18 +16,21 @@ from drake_affetto.common.typing import Array
 
 @dataclasses.dataclass
 class Hand:
-    """A mass on a spring-damper arm, with a Hunt-Crossley surface."""
+    """A mass on a spring-damper arm, with a Hunt-Crossley surface.
+
+    Attributes:
+        mass: Mass that moves with the hand, kg.
+        arm_stiffness: Spring between the hand and where it is led, N/m.
+        arm_damping: Damper between the hand and where it is led, N s/m.
+        stiffness: Contact stiffness, N/m.
+        dissipation: Hunt-Crossley dissipation, s/m.
+    """
 
     mass: float = 0.35
-    """Mass that moves with the hand, kg."""
     arm_stiffness: float = 250.0
-    """Spring between the hand and where it is led, N/m."""
     arm_damping: float = 12.0
-    """Damper between the hand and where it is led, N s/m."""
     stiffness: float = 600.0
-    """Contact stiffness, N/m."""
     dissipation: float = 1.5
-    """Hunt-Crossley dissipation, s/m."""
 
 
 def contact_force(

@@ -10,12 +10,14 @@ silence, misses and knocks, and negative for other loud tones.
 
 from collections.abc import Sequence
 import dataclasses
+import math
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import fft, ndimage, signal
 
 from drake_affetto.common.errors import require, require_array, require_range
+from drake_affetto.common.fields import check_ranges, number
 from drake_affetto.common.typing import Array
 from drake_affetto.sound import impact
 from drake_affetto.sound.voice import DrumVoice
@@ -26,42 +28,39 @@ SUCCESS_THRESHOLD = 0.15
 
 @dataclasses.dataclass
 class RewardConfig:
-    """How a recording is heard."""
+    """How a recording is heard.
 
-    window: float = 0.064
-    """Length of the Hann window of a frame, s."""
+    Attributes:
+        window: Length of the Hann window of a frame, s.
+        hop: Time from frame to frame, s.
+        bands: Number of bands m, evenly spaced in log frequency.
+        low: Lower edge of the lowest band, Hz.
+        high: Upper edge of the highest band, Hz.
+        floor: Sound pressure (rms in a band) that just begins to count, Pa.
+        contrast: Share of the local mean over bands that is taken off; 0: none.
+        contrast_width: Width of that local mean, octaves.
+        threshold: Reward above which a trial is a success.
+        lead: Part of a prototype before its loudest frame, s.
+        length: Length of a prototype, s.
+    """
+
+    window: float = number(0.064, 1e-3, 1.0)
     hop: float = 0.016
-    """Time from frame to frame, s."""
-    bands: int = 20
-    """Number of bands m, evenly spaced in log frequency."""
-    low: float = 60.0
-    """Lower edge of the lowest band, Hz."""
+    bands: int = number(20, 1, 1000)
+    low: float = number(60.0, 1e-3, math.inf)
     high: float = 800.0
-    """Upper edge of the highest band, Hz."""
-    floor: float = 1e-3
-    """Sound pressure (rms in a band) that just begins to count, Pa."""
-    contrast: float = 1.0
-    """Share of the local mean over bands that is taken off; 0: none."""
-    contrast_width: float = 2.0
-    """Width of that local mean, octaves."""
-    threshold: float = SUCCESS_THRESHOLD
-    """Reward above which a trial is a success."""
+    floor: float = number(1e-3, 1e-12, math.inf)
+    contrast: float = number(1.0, 0.0, 1.0)
+    contrast_width: float = number(2.0, 0.0, math.inf)
+    threshold: float = number(SUCCESS_THRESHOLD, 0.0, 1.0)
     lead: float = 0.064
-    """Part of a prototype before its loudest frame, s."""
     length: float = 0.4
-    """Length of a prototype, s."""
 
     def check(self, where: str) -> None:
         """Raises InputError naming the field that does not fit."""
-        require_range(f"{where}.window", self.window, 1e-3, 1.0)
+        check_ranges(self, where)
         require_range(f"{where}.hop", self.hop, 1e-4, self.window)
-        require_range(f"{where}.bands", self.bands, 1, 1000)
-        require_range(f"{where}.low", self.low, 1e-3)
         require_range(f"{where}.high", self.high, self.low * 1.01)
-        require_range(f"{where}.floor", self.floor, 1e-12)
-        require_range(f"{where}.contrast", self.contrast, 0.0, 1.0)
-        require_range(f"{where}.contrast_width", self.contrast_width, 0.0)
-        require_range(f"{where}.threshold", self.threshold, 0.0, 1.0)
         require_range(f"{where}.length", self.length, self.hop)
         require_range(f"{where}.lead", self.lead, 0.0, self.length)
 

@@ -3,62 +3,60 @@
 import dataclasses
 import math
 
-from drake_affetto.common.errors import (
-    require,
-    require_range,
-)
+from drake_affetto.common.errors import require, require_range
+from drake_affetto.common.fields import check_ranges, number
 
 
 @dataclasses.dataclass
 class MembraneConfig:
-    """The drum's head."""
+    """The drum's head.
 
-    radius: float = 0.065
-    """Radius a, m."""
-    surface_density: float = 0.26
-    """Mass per area sigma, kg/m^2."""
-    tension: float = 200.0
-    """Tension T, N/m."""
-    orders: int = 5
-    """Number of angular orders: m = 0 .. orders - 1."""
-    circles: int = 3
-    """Number of modes for each order: n = 1 .. circles."""
-    loss_factor: float = 0.012
-    """Internal loss eta: a mode decays by eta omega / 2."""
-    decay_rate: float = 4.0
-    """Decay common to all modes (rim and support), 1/s."""
+    Attributes:
+        radius: Radius a, m.
+        surface_density: Mass per area sigma, kg/m^2.
+        tension: Tension T, N/m.
+        orders: Number of angular orders: m = 0 .. orders - 1.
+        circles: Number of modes for each order: n = 1 .. circles.
+        loss_factor: Internal loss eta: a mode decays by eta omega / 2.
+        decay_rate: Decay common to all modes (rim and support), 1/s.
+        air_loading: Whether the air on both sides adds to the membrane's mass.
+        hand_damping: Dashpot of a hand that rests on the head, per newton of
+            its force, s/m: what Hunt-Crossley dissipation is to small
+            vibrations.
+    """
+
+    radius: float = number(0.065, 1e-3, 1.0)
+    surface_density: float = number(0.26, 1e-3, math.inf)
+    tension: float = number(200.0, 1e-3, math.inf)
+    orders: int = number(5, 1, 20)
+    circles: int = number(3, 1, 20)
+    loss_factor: float = number(0.012, 0.0, 1.0)
+    decay_rate: float = number(4.0, 0.0, math.inf)
     air_loading: bool = True
-    """Whether the air on both sides adds to the membrane's mass."""
-    hand_damping: float = 0.05
-    """Dashpot of a hand that rests on the head, per newton of its force
-    [s/m]: what Hunt-Crossley dissipation is to small vibrations."""
+    hand_damping: float = number(0.05, 0.0, math.inf)
 
     def check(self, where: str) -> None:
         """Raises InputError naming the field that does not fit."""
-        require_range(f"{where}.radius", self.radius, 1e-3, 1.0)
-        require_range(f"{where}.surface_density", self.surface_density, 1e-3)
-        require_range(f"{where}.tension", self.tension, 1e-3)
-        require_range(f"{where}.orders", self.orders, 1, 20)
-        require_range(f"{where}.circles", self.circles, 1, 20)
-        require_range(f"{where}.loss_factor", self.loss_factor, 0.0, 1.0)
-        require_range(f"{where}.decay_rate", self.decay_rate, 0.0)
-        require_range(f"{where}.hand_damping", self.hand_damping, 0.0)
+        check_ranges(self, where)
 
 
 @dataclasses.dataclass
 class BodyConfig:
-    """A solid body that is knocked on: some resonances in parallel."""
+    """A solid body that is knocked on: some resonances in parallel.
+
+    Attributes:
+        frequencies: Resonance frequencies, Hz.
+        qualities: Quality factor of each resonance.
+        masses: Modal mass of each resonance, kg.
+        area: Effective radiating area: volume velocity by modal velocity, m^2.
+        coupling: Part of a force on this body that shakes the head as a whole.
+    """
 
     frequencies: list[float] = dataclasses.field(default_factory=list)
-    """Resonance frequencies, Hz."""
     qualities: list[float] = dataclasses.field(default_factory=list)
-    """Quality factor of each resonance."""
     masses: list[float] = dataclasses.field(default_factory=list)
-    """Modal mass of each resonance, kg."""
-    area: float = 0.01
-    """Effective radiating area: volume velocity by modal velocity, m^2."""
-    coupling: float = 0.0
-    """Part of a force on this body that shakes the head as a whole."""
+    area: float = number(0.01, 0.0, math.inf)
+    coupling: float = number(0.0, 0.0, 1.0)
 
     def check(self, where: str) -> None:
         """Raises InputError naming the field that does not fit."""
@@ -73,25 +71,26 @@ class BodyConfig:
         for name in ("frequencies", "qualities", "masses"):
             for i, value in enumerate(getattr(self, name)):
                 require_range(f"{where}.{name}[{i}]", value, 1e-3)
-        require_range(f"{where}.area", self.area, 0.0)
-        require_range(f"{where}.coupling", self.coupling, 0.0, 1.0)
+        check_ranges(self, where)
 
 
 @dataclasses.dataclass
 class HissConfig:
-    """The noise of air jets in the valves."""
+    """The noise of air jets in the valves.
 
-    gain: float = 10.0
-    """Sound pressure (rms) at the microphone by mass flow, Pa s/kg."""
-    low: float = 1500.0
-    """Lower edge of the hiss's band, Hz."""
+    Attributes:
+        gain: Sound pressure (rms) at the microphone by mass flow, Pa s/kg.
+        low: Lower edge of the hiss's band, Hz.
+        high: Upper edge of the hiss's band, Hz.
+    """
+
+    gain: float = number(10.0, 0.0, math.inf)
+    low: float = number(1500.0, 1.0, math.inf)
     high: float = 7000.0
-    """Upper edge of the hiss's band, Hz."""
 
     def check(self, where: str) -> None:
         """Raises InputError naming the field that does not fit."""
-        require_range(f"{where}.gain", self.gain, 0.0)
-        require_range(f"{where}.low", self.low, 1.0)
+        check_ranges(self, where)
         require_range(f"{where}.high", self.high, self.low * 1.01)
 
 
@@ -117,27 +116,36 @@ def _table_default() -> BodyConfig:
 
 @dataclasses.dataclass
 class VoiceConfig:
-    """All that the drum's sound depends on besides the forces."""
+    """All that the drum's sound depends on besides the forces.
 
-    rate: float = 16000.0
-    """Sampling rate of the sound, Hz."""
+    Attributes:
+        rate: Sampling rate of the sound, Hz.
+        membrane: The drum's head.
+        shell: The drum's shell.
+        table: The table on which the drum stands.
+        hiss: The noise of the valves.
+        rim_coupling: Part of a force at the edge of the head that shakes the
+            shell; it falls with the square of the radius towards the center.
+        microphone_distance: Distance from the head's center to the microphone,
+            m.
+        microphone_angle: Angle between the drum's axis and the microphone's
+            direction, rad.
+        microphone_noise: Noise of the microphone, white, rms, Pa.
+    """
+
+    rate: float = number(16000.0, 4000.0, 192000.0)
     membrane: MembraneConfig = dataclasses.field(default_factory=MembraneConfig)
     shell: BodyConfig = dataclasses.field(default_factory=_shell_default)
     table: BodyConfig = dataclasses.field(default_factory=_table_default)
     hiss: HissConfig = dataclasses.field(default_factory=HissConfig)
-    rim_coupling: float = 0.05
-    """Part of a force at the edge of the head that shakes the shell; it falls
-    with the square of the radius towards the center."""
-    microphone_distance: float = 0.3
-    """Distance from the head's center to the microphone, m."""
-    microphone_angle: float = 1.0
-    """Angle between the drum's axis and the microphone's direction, rad."""
-    microphone_noise: float = 1e-3
-    """Noise of the microphone, white, rms, Pa."""
+    rim_coupling: float = number(0.05, 0.0, 1.0)
+    microphone_distance: float = number(0.3, 1e-2, math.inf)
+    microphone_angle: float = number(1.0, 0.0, math.pi / 2)
+    microphone_noise: float = number(1e-3, 0.0, math.inf)
 
     def check(self, where: str) -> None:
         """Raises InputError naming the field that does not fit."""
-        require_range(f"{where}.rate", self.rate, 4000.0, 192000.0)
+        check_ranges(self, where)
         self.membrane.check(f"{where}.membrane")
         self.shell.check(f"{where}.shell")
         self.table.check(f"{where}.table")
@@ -145,14 +153,3 @@ class VoiceConfig:
         require_range(
             f"{where}.hiss.high", self.hiss.high, high=0.49 * self.rate
         )
-        require_range(f"{where}.rim_coupling", self.rim_coupling, 0.0, 1.0)
-        require_range(
-            f"{where}.microphone_distance", self.microphone_distance, 1e-2
-        )
-        require_range(
-            f"{where}.microphone_angle",
-            self.microphone_angle,
-            0.0,
-            math.pi / 2,
-        )
-        require_range(f"{where}.microphone_noise", self.microphone_noise, 0.0)

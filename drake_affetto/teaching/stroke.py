@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from drake_affetto.common.errors import require_range
+from drake_affetto.common.fields import check_ranges, number
 from drake_affetto.common.typing import Array
 
 
@@ -68,27 +69,27 @@ class TeacherConfig:
         max_attempts: Maximum number of attempts at one position.
     """
 
-    duration: float = 3.0
-    recording_rate: float = 100.0
-    update_rate: float = 200.0
-    stiffness: float = 400.0
-    damping: float = 25.0
-    watching: float = 800.0
-    max_force: float = 30.0
-    bandwidth: float = 3.0
-    tremor: float = 0.15
-    gain_scale: float = 0.2
-    settling_time: float = 0.2
+    duration: float = number(3.0, 0.5, 30.0)
+    recording_rate: float = number(100.0, 10.0, 1000.0)
+    update_rate: float = number(200.0, 50.0, 1000.0)
+    stiffness: float = number(400.0, 1.0, 5000.0)
+    damping: float = number(25.0, 0.0, 500.0)
+    watching: float = number(800.0, 0.0, 10000.0)
+    max_force: float = number(30.0, 1.0, 200.0)
+    bandwidth: float = number(3.0, 0.2, 20.0)
+    tremor: float = number(0.15, 0.0, 5.0)
+    gain_scale: float = number(0.2, 0.01, 1.0)
+    settling_time: float = number(0.2, 0.01, 5.0)
     lift: ClippedNormal = _normal(0.07, 0.01)
     reach_time: ClippedNormal = _normal(0.9, 0.05)
     stroke_time: ClippedNormal = _normal(0.5, 0.05)
     press_depth: ClippedNormal = _normal(0.014, 0.002)
     dwell_time: ClippedNormal = _normal(0.25, 0.02)
     return_time: ClippedNormal = _normal(0.4, 0.03)
-    aim_sd: float = 0.005
-    firmer_depth: float = 0.005
-    firmer_dwell: float = 0.06
-    max_attempts: int = 4
+    aim_sd: float = number(0.005, 0.0, 0.05)
+    firmer_depth: float = number(0.005, 0.0, 0.02)
+    firmer_dwell: float = number(0.06, 0.0, 0.5)
+    max_attempts: int = number(4, 1, 20)
 
     def varied(self, factor: float) -> "TeacherConfig":
         """A copy with all standard deviations scaled by `factor`."""
@@ -103,24 +104,7 @@ class TeacherConfig:
 
     def check(self, where: str) -> None:
         """Raises InputError for the first field that does not fit."""
-        for name, low, high in (
-            ("duration", 0.5, 30.0),
-            ("recording_rate", 10.0, 1000.0),
-            ("update_rate", 50.0, 1000.0),
-            ("stiffness", 1.0, 5000.0),
-            ("damping", 0.0, 500.0),
-            ("watching", 0.0, 10000.0),
-            ("max_force", 1.0, 200.0),
-            ("bandwidth", 0.2, 20.0),
-            ("tremor", 0.0, 5.0),
-            ("gain_scale", 0.01, 1.0),
-            ("settling_time", 0.01, 5.0),
-            ("aim_sd", 0.0, 0.05),
-            ("firmer_depth", 0.0, 0.02),
-            ("firmer_dwell", 0.0, 0.5),
-            ("max_attempts", 1, 20),
-        ):
-            require_range(f"{where}.{name}", getattr(self, name), low, high)
+        check_ranges(self, where)
         for name in (
             "lift",
             "reach_time",

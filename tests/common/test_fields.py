@@ -14,11 +14,12 @@ class Plan:
     share: float = number(0.5, 0.0, 1.0)
     after: tuple[int, ...] = number((), 1, 5, "after which")
     name: str = option("x", "a name")
+    weight: float | None = number(None, 0.0, 2.0)
 
 
 def test_what_is_in_range_passes():
     check_ranges(Plan())
-    check_ranges(Plan(10, 1.0, (1, 5)))
+    check_ranges(Plan(10, 1.0, (1, 5), weight=2.0))
 
 
 @pytest.mark.parametrize(
@@ -28,6 +29,8 @@ def test_what_is_in_range_passes():
         (Plan(share=1.5), "share is 1.5, expected a number from 0 to 1"),
         (Plan(after=(2, 6)), "--after is 6, expected a number from 1 to 5"),
         (Plan(count="3"), "--count is '3'"),
+        (Plan(count=None), "--count is None"),
+        (Plan(share=[0.5]), r"share is \[0.5\]"),
     ],
 )
 def test_errors_name_the_option_or_the_field(plan, message):
