@@ -23,7 +23,6 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from rich.console import Console
 
-from drake_affetto import __version__
 from drake_affetto.cli.options import (
     add_plan_arguments,
     add_study_arguments,
@@ -147,15 +146,7 @@ def main() -> int:
     draw(out / "when_transfer_wins.png", rows, base)
     write_json(
         out / "results.json",
-        ConditionsResults(
-            study="conditions",
-            version=__version__,
-            seed=base.seed,
-            scenario=base.scenario,
-            repeats=base.repeats,
-            evaluations=base.evaluations,
-            conditions=rows,
-        ),
+        ConditionsResults.of(base, conditions=rows),
     )
     print(out / "when_transfer_wins.png")
     return 0

@@ -9,7 +9,6 @@ import functools
 from pathlib import Path
 from typing import Any
 
-from drake_affetto import __version__
 from drake_affetto.common.output import write_json
 from drake_affetto.experiments.drumming import run_drum
 from drake_affetto.experiments.media import ShownTrial, write_media
@@ -119,10 +118,8 @@ def _make_results(
     plan: DemoPlan, drum: DrumResults, outcome: MirrorOutcome
 ) -> DemoResults:
     count = max(plan.mirror.samples)
-    return DemoResults(
-        study="demo",
-        version=__version__,
-        seed=plan.seed,
+    return DemoResults.of(
+        plan,
         drumming=DemoDrumming(
             demonstrations=drum.demonstrations,
             taught=[

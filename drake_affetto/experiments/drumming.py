@@ -12,7 +12,6 @@ import dataclasses
 
 import numpy as np
 
-from drake_affetto import __version__
 from drake_affetto.experiments.plans import DrumPlan
 from drake_affetto.experiments.results import (
     CurvePoint,
@@ -297,14 +296,8 @@ def _make_results(
         active = LearningCurve(own, demonstrations_needed(own))
     last = [o for o in outcomes if o.test.n == plan.demonstrations]
     attempts = [each.attempts for some in demonstrations for each in some]
-    return DrumResults(
-        study="drum",
-        version=__version__,
-        seed=plan.seed,
-        scenario=plan.scenario,
-        demonstrations=plan.demonstrations,
-        evaluations=plan.evaluations,
-        repeats=plan.repeats,
+    return DrumResults.of(
+        plan,
         taught=[
             TaughtPosition(
                 repeat,

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from drake_affetto import __version__
 from drake_affetto.experiments.drumming import HIDDEN, SOURCE
 from drake_affetto.experiments.plans import MirrorPlan
 from drake_affetto.experiments.results import (
@@ -294,18 +293,8 @@ def _make_results(
                 [s.reward if s else 0.0 for row in strikes for s in row],
             )
         comparisons += compare(successes, count)
-    return MirrorResults(
-        study="mirror",
-        version=__version__,
-        seed=plan.seed,
-        scenario=plan.scenario,
-        samples=list(plan.samples),
-        repeats=plan.repeats,
-        evaluations=plan.evaluations,
-        demonstrations=plan.demonstrations,
-        choice=plan.choice,
-        variability=plan.variability,
-        workspace=plan.workspace,
+    return MirrorResults.of(
+        plan,
         schemes=schemes,
         comparisons=comparisons,
         map=example,

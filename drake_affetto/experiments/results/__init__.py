@@ -38,13 +38,14 @@ from drake_affetto.experiments.results.mirror import (
 from drake_affetto.experiments.results.rates import SuccessRate
 from drake_affetto.experiments.results.study import STUDY_RESULTS, read_study
 from drake_affetto.experiments.results.toy import (
+    PAPER,
+    SourceErrors,
     ToyFigures,
     ToyMethod,
     ToyPaper,
-    ToyPaperSource,
-    ToyPaperTransfer,
     ToyResults,
     ToySource,
+    TransferErrors,
 )
 from drake_affetto.experiments.results.trial import (
     TRIAL_RESULTS,
@@ -58,6 +59,7 @@ from drake_affetto.experiments.results.trial import (
 )
 
 __all__ = [
+    "PAPER",
     "STUDY_RESULTS",
     "TRIAL_RESULTS",
     "ConditionRow",
@@ -84,16 +86,16 @@ __all__ = [
     "SchemeCell",
     "SchemeComparisonRow",
     "SimilarityTraces",
+    "SourceErrors",
     "StrikeResult",
     "SuccessRate",
     "TaughtPosition",
     "ToyFigures",
     "ToyMethod",
     "ToyPaper",
-    "ToyPaperSource",
-    "ToyPaperTransfer",
     "ToyResults",
     "ToySource",
+    "TransferErrors",
     "TransferMap",
     "TrialResult",
     "pack",

@@ -2,42 +2,49 @@
 
 import dataclasses
 from dataclasses import field
+from typing import ClassVar
 
+from drake_affetto.common.study_results import StudyResults
 from drake_affetto.experiments.results.rates import PROBABILITY, Position
 
 
 @dataclasses.dataclass(frozen=True)
-class DemoTaught:
-    """A demonstration of the demo.
+class _Seen:
+    """A position of the drum that the robot has looked at.
 
     Attributes:
         xy: Position of the drum, m.
         tau: Task parameter τ (2,).
+    """
+
+    xy: Position
+    tau: list[float]
+
+
+@dataclasses.dataclass(frozen=True)
+class DemoTaught(_Seen):
+    """A demonstration of the demo.
+
+    Attributes:
         attempts: Number of times that the movement was demonstrated.
         reward: Reward of the best replay.
         success: Whether the robot's own replay made the drum sound.
     """
 
-    xy: Position
-    tau: list[float]
     attempts: int
     reward: float
     success: bool = True
 
 
 @dataclasses.dataclass(frozen=True)
-class DemoTrial:
+class DemoTrial(_Seen):
     """A trial of the demo.
 
     Attributes:
-        xy: Position of the drum, m.
-        tau: Task parameter τ (2,).
         reward: Reward from the sound.
         success: Whether the reward is above the threshold.
     """
 
-    xy: Position
-    tau: list[float]
     reward: float
     success: bool
 
@@ -103,22 +110,15 @@ class DemoMirror:
 
 
 @dataclasses.dataclass(frozen=True)
-class DemoResults:
+class DemoResults(StudyResults):
     """results.json of `affetto demo`.
 
     Attributes:
-        study: Kind of study, "demo".
-        version: Version of the package that ran it.
-        seed: Seed of everything that is random.
         drumming: Part in direct view.
         mirror: Part before the mirror.
     """
 
-    study: str
-    version: str
-    seed: int
+    KIND: ClassVar[str] = "demo"
+
     drumming: DemoDrumming
     mirror: DemoMirror
-
-    def check(self, where: str) -> None:
-        """All parts fit each other."""
