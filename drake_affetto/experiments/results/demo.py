@@ -9,42 +9,37 @@ from drake_affetto.experiments.results.rates import PROBABILITY, Position
 
 
 @dataclasses.dataclass(frozen=True)
-class _Seen:
-    """A position of the drum that the robot has looked at.
+class DemoTaught:
+    """A demonstration of the demo.
 
     Attributes:
         xy: Position of the drum, m.
         tau: Task parameter τ (2,).
-    """
-
-    xy: Position
-    tau: list[float]
-
-
-@dataclasses.dataclass(frozen=True)
-class DemoTaught(_Seen):
-    """A demonstration of the demo.
-
-    Attributes:
         attempts: Number of times that the movement was demonstrated.
         reward: Reward of the best replay.
         success: Whether the robot's own replay made the drum sound.
     """
 
+    xy: Position
+    tau: list[float]
     attempts: int
     reward: float
     success: bool = True
 
 
 @dataclasses.dataclass(frozen=True)
-class DemoTrial(_Seen):
+class DemoTrial:
     """A trial of the demo.
 
     Attributes:
+        xy: Position of the drum, m.
+        tau: Task parameter τ (2,).
         reward: Reward from the sound.
         success: Whether the reward is above the threshold.
     """
 
+    xy: Position
+    tau: list[float]
     reward: float
     success: bool
 
