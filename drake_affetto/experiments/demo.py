@@ -4,6 +4,7 @@ Both learn the same skill from the same demonstrations, which are therefore
 given once. Beside their results the demo leaves pictures, sounds and a replay.
 """
 
+from collections.abc import Sequence
 import contextlib
 import functools
 from pathlib import Path
@@ -39,6 +40,7 @@ def run_demo(
     pool: WorkerPool | None = None,
     watch: bool = False,
     restart: bool = False,
+    reuse: Sequence[str | Path] = (),
     console: Any = None,
     media: bool = True,
 ) -> DemoResults:
@@ -51,6 +53,7 @@ def run_demo(
         pool: Workers that run already, instead of `workers` new ones.
         watch: Whether to show the trials in Meshcat, in this process.
         restart: Whether to run finished trials again.
+        reuse: Folders of other studies whose finished trials are taken over.
         console: A rich console for messages; None for silence.
         media: Whether to write pictures, sounds and the replay too.
     """
@@ -63,6 +66,8 @@ def run_demo(
         run = functools.partial(run_task, runners=_watched_runners(console))
     with contextlib.ExitStack() as stack:
         store = stack.enter_context(TrialStore(path))
+        for folder in reuse:
+            store.merge(Path(folder) / path.name)
         executor = stack.enter_context(
             TrialExecutor(
                 run, store, workers=workers, pool=pool, quiet=console is None

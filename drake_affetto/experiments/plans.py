@@ -13,7 +13,16 @@ GREATEST_SEED = 2**31 - 1
 
 
 @dataclasses.dataclass(frozen=True)
-class DrumPlan:
+class Plan:
+    """The plan of a study; fields with a help are options of its command."""
+
+    def check(self) -> None:
+        """Raises InputError for the first value that does not fit."""
+        check_ranges(self)
+
+
+@dataclasses.dataclass(frozen=True)
+class DrumPlan(Plan):
     """How much the drumming study does.
 
     Attributes:
@@ -48,7 +57,7 @@ class DrumPlan:
 
     def check(self) -> None:
         """Raises InputError for the first value that does not fit."""
-        check_ranges(self)
+        super().check()
         for count in self.after:
             require_range("--after", count, 1, self.demonstrations)
 
@@ -60,7 +69,7 @@ class DrumPlan:
 
 
 @dataclasses.dataclass(frozen=True)
-class MirrorPlan:
+class MirrorPlan(Plan):
     """What is compared in a changed view, and how often.
 
     Attributes:
@@ -109,7 +118,7 @@ class MirrorPlan:
 
     def check(self) -> None:
         """Raises InputError for the first value that does not fit."""
-        check_ranges(self)
+        super().check()
         require(
             len(set(self.samples)) == len(self.samples) > 0,
             "--samples",
@@ -126,7 +135,7 @@ class MirrorPlan:
 
 
 @dataclasses.dataclass(frozen=True)
-class DemoPlan:
+class DemoPlan(Plan):
     """How much the demo does.
 
     Attributes:
@@ -169,7 +178,7 @@ class DemoPlan:
 
 
 @dataclasses.dataclass(frozen=True)
-class TeachPlan:
+class TeachPlan(Plan):
     """How many demonstrations are taught into a file.
 
     Attributes:
@@ -191,7 +200,7 @@ class TeachPlan:
 
 
 @dataclasses.dataclass(frozen=True)
-class ToyPlan:
+class ToyPlan(Plan):
     """How much the toy experiment does.
 
     Attributes:

@@ -65,14 +65,18 @@ def test_same_seed_same_file_in_whatever_process(demo, tmp_path):
 
 
 @pytest.mark.slow
-def test_finished_trials_are_not_run_again(demo, monkeypatch):
+@pytest.mark.parametrize("elsewhere", [False, True])
+def test_finished_trials_are_not_run_again(
+    demo, tmp_path, monkeypatch, elsewhere
+):
     out, results = demo
 
     def refuse(spec):
         raise AssertionError("this trial had been finished")
 
     monkeypatch.setattr(demo_module, "run_task", refuse)
-    again = run_demo(out, SMALL, workers=0, media=False)
+    where = {"out": tmp_path, "reuse": [out]} if elsewhere else {"out": out}
+    again = run_demo(plan=SMALL, workers=0, media=False, **where)
     assert to_plain(again) == results
 
 
