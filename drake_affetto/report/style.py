@@ -15,6 +15,7 @@ import plotly.graph_objects as go
 from drake_affetto.experiments.results import (
     SuccessRate,
 )
+from drake_affetto.report import wording
 
 # By name; every value occurs once, so that either can be told from the other.
 # The schemes' are chosen to differ for color-blind eyes too, and each has a
@@ -131,6 +132,23 @@ def scheme_marker(name: str) -> dict[str, Any]:
         "color": scheme_color(name),
         "line": {"width": 1.5, "color": scheme_color(name)},
     }
+
+
+def scheme_points(name: str, hover: str, **how: Any) -> go.Scatter:
+    """A scheme's points, with its color, symbol and name.
+
+    Args:
+        name: Scheme.
+        hover: What is shown at a point that is touched, as plotly's template.
+        how: Further arguments of plotly's scatter.
+    """
+    label = escaped(wording.scheme(name))
+    look = {"mode": "markers", "marker": scheme_marker(name)}
+    return go.Scatter(
+        name=label,
+        hovertemplate=f"{hover}<extra>{label}</extra>",
+        **(look | how),
+    )
 
 
 def whiskers(rates: Sequence[SuccessRate]) -> dict[str, Any]:

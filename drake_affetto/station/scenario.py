@@ -8,7 +8,12 @@ from typing import Any
 from pydrake.multibody.plant import MultibodyPlantConfig
 from pydrake.systems.analysis import SimulatorConfig
 
-from drake_affetto.common.errors import InputError, require, require_range
+from drake_affetto.common.errors import (
+    InputError,
+    require,
+    require_interval,
+    require_range,
+)
 from drake_affetto.common.resources import models_dir
 from drake_affetto.common.yaml_config import read_yaml, typed
 from drake_affetto.control.pidf_controller import PidfConfig
@@ -45,13 +50,7 @@ class DrumRegion:
     def check(self, where: str) -> None:
         """Raises InputError unless both are intervals."""
         for name in ("x", "y"):
-            value = getattr(self, name)
-            require(
-                len(value) == 2 and value[0] < value[1],
-                f"{where}.{name}",
-                value,
-                "a lower and a greater upper limit",
-            )
+            require_interval(f"{where}.{name}", getattr(self, name))
 
 
 @dataclasses.dataclass

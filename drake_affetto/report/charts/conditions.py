@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import plotly.graph_objects as go
-
 from drake_affetto.experiments.results import (
     ConditionRow,
 )
@@ -18,7 +16,7 @@ from drake_affetto.report.style import (
     make_figure,
     percent_axis,
     scheme_color,
-    scheme_marker,
+    scheme_points,
     signed,
     whiskers,
 )
@@ -43,17 +41,13 @@ def scenario_dots(comparisons: Mapping[str, SchemeComparison]) -> Chart:
             if name in comparisons[view].rates
         ]
         traces.append(
-            go.Scatter(
+            scheme_points(
+                name,
+                "%{customdata}: %{x:.0f} %",
                 x=[100 * r.mean for _, _, r in here],
                 y=[i + shift for i, _, _ in here],
                 error_x=whiskers([r for _, _, r in here]) | {"width": 0},
-                name=escaped(wording.scheme(name)),
-                mode="markers",
-                marker=scheme_marker(name),
                 customdata=[escaped(wording.scenario(v)) for _, v, _ in here],
-                hovertemplate="%{customdata}: %{x:.0f} %<extra>"
-                + escaped(wording.scheme(name))
-                + "</extra>",
             )
         )
     figure = make_figure(
@@ -184,17 +178,14 @@ def _condition_chart(
         own = [(escaped(x), row) for x, row in points if row.scheme == name]
         found = [row.success_rate for _, row in own]
         traces.append(
-            go.Scatter(
+            scheme_points(
+                name,
+                "%{y:.0f} %",
                 x=[ticks.index(x) for x, _ in own],
                 y=[100 * r.mean for r in found],
                 error_y=whiskers(found),
-                name=escaped(wording.scheme(name)),
                 mode="lines+markers",
                 line={"color": scheme_color(name), "width": 2},
-                marker=scheme_marker(name),
-                hovertemplate="%{y:.0f} %<extra>"
-                + escaped(wording.scheme(name))
-                + "</extra>",
             )
         )
     figure = make_figure(

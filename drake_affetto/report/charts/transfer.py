@@ -20,7 +20,7 @@ from drake_affetto.report.style import (
     percent_axis,
     reference_line,
     scheme_color,
-    scheme_marker,
+    scheme_points,
     signed,
     whiskers,
     with_lines,
@@ -118,18 +118,14 @@ def _bars(comparison: SchemeComparison, names: list[str]) -> list[Any]:
             )
         )
         traces.append(
-            go.Scatter(
-                {along: place, across: mean, f"error_{across}": error},
-                name=escaped(wording.scheme(name)),
-                mode="markers",
-                marker=scheme_marker(name),
+            scheme_points(
+                name,
+                f"%{{{across}:.0f}} % (%{{customdata[0]:.0f}} to "
+                "%{customdata[1]:.0f})",
                 customdata=[[100 * r.low, 100 * r.high] for r in found],
-                hovertemplate=f"%{{{across}:.0f}} % (%{{customdata[0]:.0f}} "
-                "to %{customdata[1]:.0f})<extra>"
-                + escaped(wording.scheme(name))
-                + "</extra>",
                 showlegend=several,
                 legendgroup=name,
+                **{along: place, across: mean, f"error_{across}": error},
             )
         )
     return traces
@@ -151,17 +147,13 @@ def rewards_by_scheme(comparison: SchemeComparison) -> Chart | None:
         # Spread by rank rather than by chance: the same page each time.
         spread = [0.28 * math.sin(2.4 * i) for i in range(len(values))]
         traces.append(
-            go.Scatter(
+            scheme_points(
+                name,
+                "R = %{x:.2f}",
                 x=values,
                 y=[row + s for s in spread],
-                name=escaped(wording.scheme(name)),
-                mode="markers",
-                marker=scheme_marker(name),
                 opacity=0.8,
                 showlegend=False,
-                hovertemplate="R = %{x:.2f}<extra>"
-                + escaped(wording.scheme(name))
-                + "</extra>",
             )
         )
         heard = sum(v > SUCCESS_THRESHOLD for v in values)
