@@ -15,7 +15,8 @@ from drake_affetto.experiments.drumming import run_drum
 from drake_affetto.experiments.media import ShownTrial, write_media
 from drake_affetto.experiments.mirror import MirrorOutcome, run_mirror
 from drake_affetto.experiments.plans import DemoPlan
-from drake_affetto.experiments.results import (
+from drake_affetto.experiments.results import DrumResults
+from drake_affetto.experiments.results.demo import (
     DemoDrumming,
     DemoMirror,
     DemoPosition,
@@ -23,7 +24,6 @@ from drake_affetto.experiments.results import (
     DemoScheme,
     DemoTaught,
     DemoTrial,
-    DrumResults,
 )
 from drake_affetto.experiments.trials import run_task
 from drake_affetto.runner.executor import TrialExecutor

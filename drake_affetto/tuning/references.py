@@ -173,11 +173,12 @@ class _Path:
         count = len(_samples(self._config, duration))
         self._parts.append(np.repeat(self.at[None], count, axis=0))
 
-    def move(self, to: Array, duration: float) -> None:
-        """Moves to the posture `to`, (n,), rad, in a time, s."""
+    def move(self, to: Array, duration: float, rest: float = 0.0) -> None:
+        """Moves to the posture `to`, (n,), rad, in a time, s, and rests."""
         blend = minimum_jerk(_samples(self._config, duration) / duration)
         self._parts.append(self.at + blend[:, None] * (to - self.at))
         self.at = to
+        self.hold(rest)
 
     def wave(self, angles: Array) -> None:
         """Follows angles, (T, n), rad, that end where they have begun."""
@@ -216,10 +217,9 @@ def _sines_and_steps(config: TuningConfig, space: JointRange) -> Reference:
     wave = wave * _directions(n) * _fade(t, sines.duration, ramp)
     path.wave(space.angle(wave))
     for level in steps.levels:
-        path.move(space.angle(level * _directions(n)), steps.rise)
-        path.hold(steps.hold)
-    path.move(space.start, 2.0 * steps.rise)
-    path.hold(config.tail)
+        to = space.angle(level * _directions(n))
+        path.move(to, steps.rise, steps.hold)
+    path.move(space.start, 2.0 * steps.rise, config.tail)
     return path.finish(TRAINING)
 
 
@@ -237,8 +237,7 @@ def _chirp(config: TuningConfig, space: JointRange) -> Reference:
     path = _Path(config, space)
     path.move(space.angle(np.zeros(n)), config.approach)
     path.wave(space.angle(wave))
-    path.move(space.start, config.approach)
-    path.hold(config.tail)
+    path.move(space.start, config.approach, config.tail)
     return path.finish("chirp")
 
 
@@ -253,10 +252,8 @@ def _strokes(config: TuningConfig, space: JointRange) -> Reference:
         to = start + rng.uniform(0.2, 0.8, n) * (
             np.where(rng.random(n) < 0.5, space.low, space.high) - start
         )
-        path.move(to, strokes.stroke)
-        path.hold(strokes.dwell)
-        path.move(start, strokes.back)
-        path.hold(strokes.pause)
+        path.move(to, strokes.stroke, strokes.dwell)
+        path.move(start, strokes.back, strokes.pause)
     path.hold(config.tail)
     return path.finish("strokes")
 
@@ -293,6 +290,5 @@ def _postures(config: TuningConfig, space: JointRange) -> Reference:
     path = _Path(config, space)
     for _ in range(shape.count):
         to = space.angle(rng.uniform(-0.9, 0.9, space.start.size))
-        path.move(to, shape.move)
-        path.hold(shape.hold)
+        path.move(to, shape.move, shape.hold)
     return path.finish(REST)
