@@ -19,7 +19,6 @@ from drake_affetto.cli.teach import print_outcomes
 from drake_affetto.common.errors import InputError
 from drake_affetto.experiments import trials as tasks
 from drake_affetto.experiments.plans import TeachPlan
-from drake_affetto.experiments.results import DemonstrationResult
 from drake_affetto.experiments.teaching import teach
 from drake_affetto.experiments.teaching_session import TeachingSession
 from drake_affetto.runner.executor import TrialExecutor
@@ -279,18 +278,6 @@ def test_two_at_one_file_are_noticed(tmp_path, trials):
     taught_here(one)
     with pytest.raises(InputError, match="another process"):
         taught_here(other)
-
-
-def test_a_drum_that_is_not_seen_is_reported():
-    buffer = io.StringIO()
-    nothing = np.zeros(0)
-    unseen = DemonstrationResult(
-        *([0.2, 0.0], False, [0.0, 0.0], 0, False, 0.0, 0.0),
-        *(nothing, nothing, nothing),
-    )
-    print_outcomes([unseen], Console(file=buffer, width=100))
-    assert "drum not seen" in buffer.getvalue()
-    print_outcomes([], Console(file=buffer, width=100))
 
 
 @pytest.mark.slow

@@ -160,3 +160,21 @@ def test_runners_can_be_handed_in():
         trials.look("drumming", XY, 3), {"drumming": Watched()}
     )
     assert found == results.GazeResult(True, [0.25, 3.0], 1.5)
+
+
+def test_positions_fill_the_region_and_depend_on_the_seed():
+    scenario = load_scenario("drumming")
+    region = scenario.drum_region
+    low = np.array([region.x[0], region.y[0]])
+    high = np.array([region.x[1], region.y[1]])
+    for count in (1, 5, 12):
+        first = trials.draw_positions(scenario, count, np.random.default_rng(1))
+        assert first.shape == (count, 2)
+        assert np.all((first >= low) & (first <= high))
+        again = trials.draw_positions(scenario, count, np.random.default_rng(1))
+        np.testing.assert_array_equal(first, again)
+        other = trials.draw_positions(scenario, count, np.random.default_rng(2))
+        assert not np.array_equal(first, other)
+    # Spread: each quarter of the region has some of 12.
+    cells = ((first - low) / (high - low) > 0.5) @ [1, 2]
+    assert set(cells.tolist()) == {0, 1, 2, 3}
