@@ -24,8 +24,6 @@ from drake_affetto.experiments.teaching_session import TeachingSession
 from drake_affetto.runner.executor import TrialExecutor
 from drake_affetto.runner.store import TrialStore
 from drake_affetto.teaching.demonstrations import (
-    Demonstration,
-    append_demonstration,
     read_demonstrations,
 )
 
@@ -232,44 +230,6 @@ def test_a_file_of_another_session_is_refused(
     with pytest.raises(InputError, match=message):
         session(path, 2, **changes)
     assert path.read_bytes() == before
-
-
-def test_files_of_others_are_refused(tmp_path, monkeypatch):
-    path = tmp_path / "taught.h5"
-
-    def holds(**changes):
-        path.unlink(missing_ok=True)
-        values = {
-            "t": [0.0, 1.0],
-            "q": np.zeros((2, 1)),
-            "joint_names": ["waist_yaw"],
-            "drum_xy": [0.2, -0.1],
-            "scenario": "drumming",
-            "seed": 0,
-        }
-        append_demonstration(path, Demonstration(**{**values, **changes}))
-
-    holds(version="0.0.0")
-    with pytest.raises(InputError, match=r"version 0\.0\.0, not"):
-        session(path)
-    holds(seed=None)
-    with pytest.raises(InputError, match="seed None, not 0"):
-        session(path)
-    holds()
-    with pytest.raises(InputError, match="other positions"):
-        session(path)
-    path.write_text("t, q0\n")
-    with pytest.raises(InputError, match="no HDF5 file"):
-        session(path)
-    with pytest.raises(InputError, match="not a folder"):
-        session(tmp_path)
-
-
-def test_a_robot_that_does_not_move_by_itself_cannot_be_taught(tmp_path):
-    path = tmp_path / "mine.yaml"
-    path.write_text("extends: drumming\nmotion_source: external\n")
-    with pytest.raises(InputError, match="motion_source"):
-        session(tmp_path / "t.h5", scenario=str(path))
 
 
 def test_two_at_one_file_are_noticed(tmp_path, trials):

@@ -137,18 +137,6 @@ def test_a_trial_is_known_by_all_that_determines_it(tmp_path):
     trials._fingerprint.cache_clear()
 
 
-def test_results_go_to_the_store_and_back(demonstration):
-    plain, arrays = demonstration
-    typed = results.unpack("demonstration", plain, arrays)
-    assert typed.xy == XY
-    again, more = results.pack(typed)
-    assert again == plain
-    for name, array in arrays.items():
-        np.testing.assert_array_equal(more[name], array)
-    with pytest.raises(InputError, match="'dance'"):
-        results.unpack("dance", plain, arrays)
-
-
 def test_runners_can_be_handed_in():
     """For trials that are watched, for instance."""
 
