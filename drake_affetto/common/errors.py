@@ -41,6 +41,11 @@ def require_range(
     require(fits and math.isfinite(value), field, value, expected)
 
 
+def require_choice(field: str, value: Any, *choices: Any) -> None:
+    """Raises InputError unless `value` is one of `choices`."""
+    require(value in choices, field, value, " or ".join(map(repr, choices)))
+
+
 def require_interval(field: str, value: Sequence[float]) -> None:
     """Raises InputError unless `value` is a lower and a greater upper limit."""
     require(

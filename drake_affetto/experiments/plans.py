@@ -5,7 +5,7 @@ Nothing heavy is imported here: a command's help shows a plan's defaults.
 
 import dataclasses
 
-from drake_affetto.common.errors import require, require_range
+from drake_affetto.common.errors import require, require_choice, require_range
 from drake_affetto.common.fields import check_ranges, number, option
 from drake_affetto.skill.scheme_names import PAPER_SCHEMES, STUDY_SCHEMES
 
@@ -126,12 +126,7 @@ class MirrorPlan(Plan):
             "numbers of samples, each once",
         )
         require_range("pool", self.pool_size, max(self.samples), 1000)
-        require(
-            self.choice in ("random", "spread"),
-            "choice",
-            self.choice,
-            "'random' or 'spread'",
-        )
+        require_choice("choice", self.choice, "random", "spread")
 
 
 @dataclasses.dataclass(frozen=True)

@@ -20,7 +20,10 @@ from drake_affetto.sound.reward import (
     tap_recordings,
 )
 from drake_affetto.sound.separation import (
+    HITS,
     made_up_trial,
+    made_up_trials,
+    separation,
 )
 from drake_affetto.sound.voice import DrumVoice
 
@@ -236,3 +239,29 @@ def test_reward_over_time_peaks_at_the_reward():
         assert course[o] == pytest.approx(by_hand, abs=1e-9)
     with pytest.raises(InputError, match="one shape"):
         reward_over_time(trial, [prototypes[0], prototypes[1][:, :5]])
+
+
+def test_reward_separates_hits_from_everything_else():
+    voice = DrumVoice()
+    rng = np.random.default_rng(0)
+    config = RewardConfig()
+    assert config.threshold == 0.15
+    prototypes = [
+        cut_prototype(
+            spectrogram(made_up_trial("head", voice, rng).pressure, voice.rate)
+        )
+        for _ in range(10)
+    ]
+    taps = tap_prototypes(voice)
+    trials = list(made_up_trials(voice, rng, 12))
+    heard = [spectrogram(trial.pressure, voice.rate) for trial in trials]
+    hits = [trial.kind in HITS for trial in trials]
+    firm = np.array([trial.kind == "head" for trial in trials])
+    pressed = np.array([trial.kind == "slow press" for trial in trials])
+    for judges in (prototypes, taps, prototypes[:1]):
+        rewards = np.array([reward(sound, judges) for sound in heard])
+        assert separation(rewards, hits).auc > 0.99
+        assert rewards[firm].min() > 0.2
+        # Without a press that is not quite gentle, nothing comes near.
+        assert rewards[~np.array(hits) & ~pressed].max() < 0.15
+        assert np.mean(rewards[pressed] > 0.15) < 0.25
