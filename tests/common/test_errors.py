@@ -112,7 +112,7 @@ def test_a_large_array_is_not_printed():
 
 def test_choices_and_intervals_are_told():
     require_choice("mode", "b", "a", "b")
-    with pytest.raises(InputError, match="^mode is 'c', expected 'a' or 'b'$"):
+    with pytest.raises(InputError, match=r"^mode is 'c', expected 'a' or 'b'$"):
         require_choice("mode", "c", "a", "b")
     require_interval("x", [1.0, 2.0])
     for pair in ([2.0, 1.0], [1.0, 1.0], [1.0], [1.0, 2.0, 3.0]):

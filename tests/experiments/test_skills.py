@@ -22,13 +22,13 @@ def executor(tmp_path):
 
 
 def test_all_that_is_taught_has_succeeded(executor):
-    # Of 12 positions some fail, and others take their place.
-    taught = skills.teach_positions(executor, "taught", "drumming", 12, (0, 1))
-    assert len(taught) == 12
+    # Some of the positions fail, and others take their place.
+    taught = skills.teach_positions(executor, "taught", "drumming", 40, (0, 1))
+    assert len(taught) == 40
     assert all(each.success for each in taught)
     assert executor._store.phases()[1].label == "taught, further positions"
-    assert skills.task_parameters(taught).shape == (12, 2)
-    assert skills.stack_prototypes(taught).shape == (12, 4, 5)
+    assert skills.task_parameters(taught).shape == (40, 2)
+    assert skills.stack_prototypes(taught).shape == (40, 4, 5)
 
 
 def test_a_skill_knows_what_came_before_and_nothing_later(executor):
