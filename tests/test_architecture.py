@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator
+import functools
 import os
 from pathlib import Path
 import re
@@ -113,6 +114,7 @@ def test_imports_run_one_way(path):
         assert RANK[there] <= RANK[own], f"{own} imports the later {there}"
 
 
+@functools.cache
 def import_graph() -> dict[str, set[str]]:
     """For each module of the package those that it imports, anywhere."""
     known = set(map(module_name, MODULES))
@@ -246,23 +248,6 @@ _SOURCES = "index[-_]" + "url|find[-_]" + "links"
 FOREIGN = re.compile(rf"(?<![\w.$~}}*/:-])/(?:{_PLACES})/\w|{_SOURCES}")
 
 
-@pytest.mark.parametrize(
-    ("text", "is_foreign"),
-    [
-        ("see " + "/ho" + "me/someone/file", True),
-        ('"' + "/wo" + 'rk/shared"', True),
-        ("pip install --index" + "-url somewhere thing", True),
-        ("../shared/DESIGN.md", False),
-        ("models/work/part.sdf", False),
-        ("package://drake_affetto/sdf/x.sdf", False),
-        ("$HOME/root/file", False),
-        ("/usr/bin/python3.11", False),
-    ],
-)
-def test_search_for_machine_names_finds_what_it_should(text, is_foreign):
-    assert bool(FOREIGN.search(text)) == is_foreign
-
-
 def test_no_file_names_a_machine_or_a_package_host():
     if shutil.which("git") is None or not (ROOT / ".git").exists():
         pytest.skip("not a git checkout")
@@ -349,17 +334,25 @@ OLD_VALUES = re.compile(r"""["'`]centre["'`]|mode: centre|n_labelled""")
 
 
 @pytest.mark.parametrize(
-    ("text", "is_british"),
+    ("search", "text", "found"),
     [
-        ("the colour of", True),
-        ("normalised", True),
-        ("_centre_of", True),
-        ("color, center and normalize", False),
-        ("precise analysis of parameters", False),
+        (FOREIGN, "see " + "/ho" + "me/someone/file", True),
+        (FOREIGN, '"' + "/wo" + 'rk/shared"', True),
+        (FOREIGN, "pip install --index" + "-url somewhere thing", True),
+        (FOREIGN, "../shared/DESIGN.md", False),
+        (FOREIGN, "models/work/part.sdf", False),
+        (FOREIGN, "package://drake_affetto/sdf/x.sdf", False),
+        (FOREIGN, "$HOME/root/file", False),
+        (FOREIGN, "/usr/bin/python3.11", False),
+        (BRITISH, "the colour of", True),
+        (BRITISH, "normalised", True),
+        (BRITISH, "_centre_of", True),
+        (BRITISH, "color, center and normalize", False),
+        (BRITISH, "precise analysis of parameters", False),
     ],
 )
-def test_search_for_spelling_finds_what_it_should(text, is_british):
-    assert bool(BRITISH.search(text)) == is_british
+def test_searches_find_what_they_should(search, text, found):
+    assert bool(search.search(text)) == found
 
 
 def test_spelling_is_american():
@@ -372,3 +365,150 @@ def test_spelling_is_american():
                     place = path.relative_to(ROOT).as_posix()
                     found.append(f"{place}:{number}: {line.strip()[:70]}")
     assert found == []
+
+
+# --- Tests beside the code ---------------------------------------------------
+
+TESTS = ROOT / "tests"
+
+# Modules, or folders of them, whose tests stand in another file than their own:
+# parts of one thing, which is tested as a whole there.
+TESTED_IN = {
+    "cli/drum": "cli/test_study_command.py",
+    "cli/identify": "identification/test_study.py",
+    "cli/mirror": "cli/test_study_command.py",
+    "cli/tune": "tuning/test_study.py",
+    "experiments/media": "experiments/test_demo.py",
+    "experiments/results": "experiments/results/test_study.py",
+    "identification/plots": "identification/test_study.py",
+    "identification/prediction": "identification/test_study.py",
+    "identification/results": "identification/test_study.py",
+    "motion/encoding": "motion/test_dmp.py",
+    "motion/spring": "motion/test_dmp.py",
+    "perception/config": "perception/test_mirror_camera.py",
+    "report/charts": "report/test_page.py",
+    "report/parts": "report/test_page.py",
+    "report/report_data": "report/test_page.py",
+    "report/sections": "report/test_page.py",
+    "runner/progress": "runner/test_executor.py",
+    "skill/optical": "perception/test_optical_map.py",
+    "skill/residuals": "skill/test_transfer.py",
+    "skill/search": "skill/test_transfer.py",
+    "sound/modes": "sound/test_voice.py",
+    "sound/ringing": "sound/test_voice.py",
+    "sound/voice_config": "sound/test_voice.py",
+    "tuning/evaluation": "tuning/test_study.py",
+    "tuning/results": "tuning/test_study.py",
+    "tuning/trial": "tuning/test_study.py",
+}
+
+# Further tests of a module, which need something else: a browser, rendered
+# images, the files of the models.
+MORE_TESTS = {
+    "experiments/test_workspace_images.py": "experiments/workspace",
+    "report/test_browser.py": "report/page",
+    "scene/test_contact.py": "scene/world",
+    "scene/test_models.py": "scene/world",
+    "scene/test_world_frames.py": "scene/world",
+}
+
+
+def in_rooms(root: Path, pattern: str) -> dict[str, Path]:
+    """The files of the rooms' folders: "skill/elm" or "skill/test_elm.py"."""
+    rooms = [path.name for path in PACKAGE.iterdir() if path.is_dir()]
+    return {
+        path.relative_to(root).as_posix(): path
+        for room in rooms
+        for path in (root / room).rglob(pattern)
+    }
+
+
+def own_test(module: str) -> str:
+    folder, _, name = module.rpartition("/")
+    return f"{folder}/test_{name}.py"
+
+
+def has_code(path: Path) -> bool:
+    kinds = (ast.FunctionDef, ast.ClassDef)
+    return any(
+        isinstance(node, kinds) for node in ast.parse(path.read_text()).body
+    )
+
+
+def imported_names(path: Path) -> set[str]:
+    """Modules that a file imports, and what it imports from them."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module is not None:
+            found.add(node.module)
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def reached(test: Path) -> set[str]:
+    """What of the package a test imports, itself or through others."""
+    files = [test, test.with_name("conftest.py")]
+    wanted = set().union(*(imported_names(f) for f in files if f.is_file()))
+    for path in (TESTS / "support").glob("*.py"):
+        if f"support.{path.stem}" in wanted:
+            wanted |= imported_names(path)
+    graph = dict(import_graph())
+    # The command imports a command, and the package's face a room, by its name.
+    graph["drake_affetto.cli.main"] = {
+        module for module in graph if place(module) == "cli"
+    }
+    del graph["drake_affetto"]
+    waiting = wanted & set(graph)
+    found: set[str] = set()
+    while waiting:
+        module = waiting.pop()
+        found.add(module)
+        waiting |= (graph[module] & set(graph)) - found
+    return found
+
+
+def modules_with_code() -> dict[str, Path]:
+    """Those that have something to test, as "skill/elm"."""
+    return {
+        name.removesuffix(".py"): path
+        for name, path in in_rooms(PACKAGE, "[!_]*.py").items()
+        if has_code(path)
+    }
+
+
+def untested_in(entry: str) -> list[str]:
+    """Modules without a file of tests that a module or folder stands for."""
+    return [
+        module
+        for module in modules_with_code()
+        if entry in (module, module.rpartition("/")[0])
+        and not (TESTS / own_test(module)).is_file()
+    ]
+
+
+def test_every_module_with_code_has_its_tests():
+    covered = {each for entry in TESTED_IN for each in untested_in(entry)}
+    missing = {
+        module
+        for module in modules_with_code()
+        if not (TESTS / own_test(module)).is_file()
+    }
+    assert missing == covered
+
+
+def test_every_test_has_its_module():
+    known = {own_test(module) for module in modules_with_code()}
+    assert set(in_rooms(TESTS, "test_*.py")) - known == set(MORE_TESTS)
+
+
+@pytest.mark.parametrize(("entry", "test"), TESTED_IN.items())
+def test_tests_of_a_neighbor_import_what_they_stand_for(entry, test):
+    modules = untested_in(entry)
+    assert modules, "an entry that is not needed"
+    names = {f"drake_affetto.{each.replace('/', '.')}" for each in modules}
+    assert names <= reached(TESTS / test)
+
+
+@pytest.mark.parametrize(("test", "module"), MORE_TESTS.items())
+def test_further_tests_import_their_module(test, module):
+    assert f"drake_affetto.{module.replace('/', '.')}" in reached(TESTS / test)

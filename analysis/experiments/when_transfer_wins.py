@@ -21,18 +21,11 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
-from rich.console import Console
 
-from drake_affetto import __version__
-from drake_affetto.cli.options import (
-    add_plan_arguments,
-    add_study_arguments,
-    check_study_arguments,
-    make_plan,
-    study,
-)
+from drake_affetto.cli.options import make_plan
+from drake_affetto.cli.study_command import StudyCommand
 from drake_affetto.common.errors import InputError
-from drake_affetto.common.output import atomic_path, write_json
+from drake_affetto.common.output import atomic_path
 from drake_affetto.experiments.mirror import run_mirror
 from drake_affetto.experiments.plans import MirrorPlan
 from drake_affetto.experiments.results import ConditionRow, ConditionsResults
@@ -111,16 +104,15 @@ def draw(path: Path, rows, plan) -> None:
     plt.close(figure)
 
 
-def main() -> int:
-    """Runs the study and draws it."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    add_plan_arguments(parser, MirrorPlan)
-    add_study_arguments(parser, "out/conditions")
-    parser.set_defaults(samples=[3, 4, 5, 8, 12], repeats=3)
-    args = parser.parse_args()
-    console = Console()
-    try:
-        base = make_plan(
+class ConditionsCommand(StudyCommand[MirrorPlan]):
+    """The mirror study under each condition."""
+
+    plan = MirrorPlan
+    out = "out/conditions"
+
+    def make_plan(self, args):
+        """The mirror study's plan, before a condition changes it."""
+        return make_plan(
             MirrorPlan,
             args,
             samples=tuple(sorted(args.samples)),
@@ -128,37 +120,39 @@ def main() -> int:
             # Something to choose from, also for the most samples.
             pool=max(6, *args.samples) + 2,
         )
-        base.check()
-        check_study_arguments(args)
+
+    def scenarios(self, plan):
+        """Direct view, in which the first trials teach the skill, and other."""
+        return plan.direct, plan.scenario
+
+    def study(self, call):
+        """Runs the study under each condition; gives rows of success."""
         rows = []
-        with study(args, console, base.direct, base.scenario) as (
-            out,
-            executor,
-        ):
-            for condition, changes in CONDITIONS.items():
-                name = ": ".join(condition)
-                plan = dataclasses.replace(base, name=name, **changes)
-                rows += rows_of(condition, run_mirror(executor, plan).results)
+        for condition, changes in CONDITIONS.items():
+            name = ": ".join(condition)
+            plan = dataclasses.replace(call.plan, name=name, **changes)
+            rows += rows_of(condition, run_mirror(call.executor, plan).results)
+        return rows
+
+    def finish(self, call, found):
+        """Draws the rows."""
+        draw(call.out / "when_transfer_wins.png", found, call.plan)
+        return ConditionsResults.of(call.plan, conditions=found)
+
+
+def main() -> int:
+    """Runs the study and draws it."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    command = ConditionsCommand()
+    command.add_arguments(parser)
+    parser.set_defaults(samples=[3, 4, 5, 8, 12], repeats=3)
+    try:
+        return command.run(parser.parse_args())
     except InputError as error:
         print(f"when_transfer_wins: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
-    draw(out / "when_transfer_wins.png", rows, base)
-    write_json(
-        out / "results.json",
-        ConditionsResults(
-            study="conditions",
-            version=__version__,
-            seed=base.seed,
-            scenario=base.scenario,
-            repeats=base.repeats,
-            evaluations=base.evaluations,
-            conditions=rows,
-        ),
-    )
-    print(out / "when_transfer_wins.png")
-    return 0
 
 
 if __name__ == "__main__":

@@ -5,17 +5,12 @@ import contextlib
 import math
 from typing import TYPE_CHECKING, Any
 
-from drake_affetto.cli.options import (
-    add_output_argument,
-    add_plan_arguments,
-    add_restart_argument,
-    add_workers_argument,
-    make_plan,
+from drake_affetto.cli.options import add_restart_argument
+from drake_affetto.cli.study_command import (
+    StudyCommand,
     tells_how_to_continue,
-    worker_count,
     worker_pool,
 )
-from drake_affetto.common.fields import check_ranges
 from drake_affetto.common.output import prepare_output
 from drake_affetto.experiments.plans import DemoPlan
 
@@ -23,54 +18,53 @@ if TYPE_CHECKING:
     from drake_affetto.experiments.results import DemoResults
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declares the command's options."""
-    add_output_argument(parser, "out/demo")
-    add_plan_arguments(parser, DemoPlan)
-    add_workers_argument(parser)
-    parser.add_argument(
-        "--meshcat",
-        action="store_true",
-        help="show the trials in a browser as they run, in one process",
-    )
-    add_restart_argument(parser)
+class DemoCommand(StudyCommand[DemoPlan]):
+    """Runs a small drum and a small mirror study, and shows them on a page."""
 
+    plan = DemoPlan
+    out = "out/demo"
 
-def run(args: argparse.Namespace) -> int:
-    """Runs the demo; returns the exit code."""
-    plan = make_plan(DemoPlan, args)
-    check_ranges(plan)
-    worker_count(args)
-    out = prepare_output(args.out)
-
-    from rich.console import Console
-
-    console = Console()
-    with contextlib.ExitStack() as stack:
-        stack.enter_context(tells_how_to_continue(console, out))
-        pool = None
-        if not args.meshcat:
-            pool = stack.enter_context(worker_pool(args, plan.drum.scenario))
-        with console.status("Starting"):
-            from drake_affetto.experiments.demo import run_demo
-        results = run_demo(
-            out,
-            plan,
-            pool=pool,
-            watch=args.meshcat,
-            restart=args.restart,
-            console=console,
+    def add_options(self, parser: argparse.ArgumentParser) -> None:
+        """Declares whether to watch and whether to begin anew."""
+        parser.add_argument(
+            "--meshcat",
+            action="store_true",
+            help="show the trials in a browser as they run, in one process",
         )
-    _print_tables(results, console)
+        add_restart_argument(parser)
 
-    from drake_affetto.report import write_report
+    def work(
+        self, plan: DemoPlan, args: argparse.Namespace, console: Any
+    ) -> None:
+        """Runs the demo and writes its page."""
+        out = prepare_output(args.out)
+        with contextlib.ExitStack() as stack:
+            stack.enter_context(tells_how_to_continue(console, out))
+            pool = None
+            if not args.meshcat:
+                pool = stack.enter_context(
+                    worker_pool(args, plan.drum.scenario)
+                )
+            with console.status("Starting"):
+                from drake_affetto.experiments.demo import run_demo
+            results = run_demo(
+                out,
+                plan,
+                pool=pool,
+                watch=args.meshcat,
+                restart=args.restart,
+                reuse=args.reuse,
+                console=console,
+            )
+        _print_tables(results, console)
 
-    page = write_report([out], out / "report.html")
-    console.print(
-        f"Results, pictures, sounds and the replay are in {out}; the page "
-        f"that shows them all is {page}"
-    )
-    return 0
+        from drake_affetto.report import write_report
+
+        page = write_report([out], out / "report.html")
+        console.print(
+            f"Results, pictures, sounds and the replay are in {out}; the page "
+            f"that shows them all is {page}"
+        )
 
 
 def _print_tables(results: "DemoResults", console: Any) -> None:
@@ -108,3 +102,7 @@ def _print_tables(results: "DemoResults", console: Any) -> None:
             " ".join(f"{value:.2f}" for value in scheme.rewards),
         )
     console.print(table)
+
+
+_COMMAND = DemoCommand()
+add_arguments, run = _COMMAND.add_arguments, _COMMAND.run

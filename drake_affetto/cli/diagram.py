@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from drake_affetto.cli.options import add_scenario_argument
 from drake_affetto.common.errors import require
 from drake_affetto.common.output import prepare_output
 from drake_affetto.station.diagram_drawing import check_suffix, write_diagram
@@ -10,12 +11,7 @@ from drake_affetto.station.diagram_drawing import check_suffix, write_diagram
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's options."""
-    parser.add_argument(
-        "--scenario",
-        metavar="NAME",
-        default="drumming",
-        help="scenario, by name or YAML file",
-    )
+    add_scenario_argument(parser, metavar="NAME")
     parser.add_argument(
         "--out",
         metavar="FILE",

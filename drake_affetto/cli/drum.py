@@ -1,66 +1,54 @@
 """`affetto drum`: learning to drum from demonstrations (paper Figs. 3b, 3c)."""
 
-import argparse
 from typing import TYPE_CHECKING, Any
 
-from drake_affetto.cli.options import (
-    add_plan_arguments,
-    add_study_arguments,
-    check_study_arguments,
-    make_plan,
-    rate_text,
-    study,
-)
-from drake_affetto.common.output import write_json
+from drake_affetto.cli.study_command import Call, StudyCommand, rate_text
 from drake_affetto.experiments.plans import DrumPlan
 
 if TYPE_CHECKING:
     from drake_affetto.experiments.results import DrumResults
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declares the command's options."""
-    add_plan_arguments(parser, DrumPlan)
-    add_study_arguments(parser, "out/drum")
+class DrumCommand(StudyCommand[DrumPlan]):
+    """Teaches, and tests the skill after each demonstration."""
 
+    plan = DrumPlan
+    out = "out/drum"
 
-def run(args: argparse.Namespace) -> int:
-    """Runs the study; returns the exit code."""
-    plan = make_plan(DrumPlan, args)
-    plan.check()
-    check_study_arguments(args)
+    def scenarios(self, plan: DrumPlan) -> tuple[str, ...]:
+        """That of the plan."""
+        return (plan.scenario,)
 
-    from rich.console import Console
-
-    console = Console()
-    with study(args, console, plan.scenario) as (out, executor):
+    def study(self, call: Call[DrumPlan]) -> "DrumResults":
+        """Runs the study."""
         from drake_affetto.experiments.drumming import run_drum
 
-        results = run_drum(executor, plan)
-    write_json(out / "results.json", results)
-    _print(results, console)
-    console.print(f"results: {out / 'results.json'}")
-    return 0
+        return run_drum(call.executor, call.plan)
+
+    def show(self, results: "DrumResults", console: Any) -> None:
+        """Prints success over demonstrations, and how good the reward is."""
+        from rich.table import Table
+
+        curves = {"random order": results.by_demonstrations}
+        if results.active is not None:
+            curves["its own choice"] = results.active.by_demonstrations
+        table = Table(title="Success at test positions")
+        table.add_column("demonstrations", justify="right")
+        for name in curves:
+            table.add_column(name)
+        for points in zip(*curves.values(), strict=True):
+            rates = [point.success_rate for point in points]
+            table.add_row(str(points[0].n), *map(rate_text, rates))
+        console.print(table)
+        evaluation = results.separation
+        console.print(
+            f"{results.first_try:.0%} of the demonstrations made the drum "
+            f"sound at the first try. In {evaluation.trials} trials there "
+            f"were {evaluation.false_hits} successes without a hit, and "
+            f"{evaluation.missed_hits} of {evaluation.hits} hits were not "
+            "heard."
+        )
 
 
-def _print(results: "DrumResults", console: Any) -> None:
-    from rich.table import Table
-
-    curves = {"random order": results.by_demonstrations}
-    if results.active is not None:
-        curves["its own choice"] = results.active.by_demonstrations
-    table = Table(title="Success at test positions")
-    table.add_column("demonstrations", justify="right")
-    for name in curves:
-        table.add_column(name)
-    for points in zip(*curves.values(), strict=True):
-        rates = [point.success_rate for point in points]
-        table.add_row(str(points[0].n), *map(rate_text, rates))
-    console.print(table)
-    evaluation = results.separation
-    console.print(
-        f"{results.first_try:.0%} of the demonstrations made the drum sound "
-        f"at the first try. In {evaluation.trials} trials there were "
-        f"{evaluation.false_hits} successes without a hit, and "
-        f"{evaluation.missed_hits} of {evaluation.hits} hits were not heard."
-    )
+_COMMAND = DrumCommand()
+add_arguments, run = _COMMAND.add_arguments, _COMMAND.run

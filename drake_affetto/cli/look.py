@@ -3,7 +3,11 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from drake_affetto.cli.options import add_output_argument, add_seed_argument
+from drake_affetto.cli.options import (
+    add_output_argument,
+    add_scenario_argument,
+    add_seed_argument,
+)
 from drake_affetto.common.errors import require_range
 from drake_affetto.common.output import prepare_output
 
@@ -17,12 +21,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's options."""
-    parser.add_argument(
-        "scenario",
-        nargs="?",
-        default="drumming",
-        help="scenario, by name or YAML file",
-    )
+    add_scenario_argument(parser, "scenario", nargs="?")
     parser.add_argument(
         "--drum",
         metavar=("X", "Y"),

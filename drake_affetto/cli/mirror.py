@@ -5,93 +5,87 @@ import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from drake_affetto import __version__
-from drake_affetto.cli.options import (
-    add_plan_arguments,
-    add_study_arguments,
-    check_study_arguments,
-    make_plan,
-    rate_text,
-    study,
-)
-from drake_affetto.common.output import write_json
+from drake_affetto.cli.options import add_renamed_flag, make_plan
+from drake_affetto.cli.study_command import Call, StudyCommand, rate_text
 from drake_affetto.experiments.plans import MirrorPlan
 
 if TYPE_CHECKING:
     from drake_affetto.experiments.mirror import MirrorOutcome
     from drake_affetto.experiments.results import MirrorResults
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declares the command's options."""
-    which = parser.add_mutually_exclusive_group()
-    which.add_argument(
-        "--scenario",
-        help=f"scenario of the changed view, by name or YAML file "
-        f"({MirrorPlan.scenario})",
-    )
-    which.add_argument(
-        "--all-scenarios",
-        action="store_true",
-        help="run every changed view that comes with the package",
-    )
-    add_plan_arguments(parser, MirrorPlan)
-    parser.add_argument(
-        "--no-media",
-        action="store_true",
-        help="do not record a replay, pictures and sounds of a trial",
-    )
-    # Its name in version 0.1.0.
-    parser.add_argument(
-        "--no-exhibits",
-        dest="no_media",
-        action="store_true",
-        default=argparse.SUPPRESS,
-        help=argparse.SUPPRESS,
-    )
-    add_study_arguments(parser, "out/mirror")
+Outcomes = dict[str, "MirrorOutcome"]
 
 
-def run(args: argparse.Namespace) -> int:
-    """Runs the study; returns the exit code."""
-    plan = make_plan(
-        MirrorPlan,
-        args,
-        scenario=args.scenario or MirrorPlan.scenario,
-        samples=tuple(sorted(args.samples)),
-    )
-    plan.check()
-    check_study_arguments(args)
+class MirrorCommand(StudyCommand[MirrorPlan]):
+    """Compares schemes of transfer, in one changed view or in all."""
 
-    from rich.console import Console
+    plan = MirrorPlan
+    out = "out/mirror"
 
-    console = Console()
-    found = {}
-    # The first trials teach the skill in direct view.
-    with study(args, console, plan.direct, plan.scenario) as (out, executor):
+    def add_options(self, parser: argparse.ArgumentParser) -> None:
+        """Declares which views there are, and what is recorded."""
+        which = parser.add_mutually_exclusive_group()
+        which.add_argument(
+            "--scenario",
+            help=f"scenario of the changed view, by name or YAML file "
+            f"({MirrorPlan.scenario})",
+        )
+        which.add_argument(
+            "--all-scenarios",
+            action="store_true",
+            help="run every changed view that comes with the package",
+        )
+        add_renamed_flag(
+            parser,
+            "--no-media",
+            "--no-exhibits",
+            "do not record a replay, pictures and sounds of a trial",
+        )
+
+    def make_plan(self, args: argparse.Namespace) -> MirrorPlan:
+        """The plan that the options describe."""
+        return make_plan(
+            MirrorPlan,
+            args,
+            scenario=args.scenario or MirrorPlan.scenario,
+            samples=tuple(sorted(args.samples)),
+        )
+
+    def scenarios(self, plan: MirrorPlan) -> tuple[str, ...]:
+        """Direct view, in which the first trials teach the skill, and other."""
+        return plan.direct, plan.scenario
+
+    def study(self, call: Call[MirrorPlan]) -> Outcomes:
+        """Runs the study of each view; prints its results as they come."""
         from drake_affetto.experiments.mirror import changed_views, run_mirror
 
-        names = changed_views() if args.all_scenarios else [plan.scenario]
-        for name in names:
-            outcome = run_mirror(
-                executor, dataclasses.replace(plan, scenario=name)
+        plan = call.plan
+        found = {}
+        for name in (
+            changed_views() if call.args.all_scenarios else [plan.scenario]
+        ):
+            found[name] = run_mirror(
+                call.executor, dataclasses.replace(plan, scenario=name)
             )
-            found[name] = outcome.results
-            _print(outcome.results, console)
-    if not args.no_media and not args.all_scenarios:
-        console.print("Recording a direct and a mirrored trial ...")
-        _show(out, outcome, plan)
-    results: Any = found[names[0]]
-    if args.all_scenarios:
-        from drake_affetto.experiments.results import ScenariosResults
+            _print(found[name].results, call.console)
+        return found
 
-        results = ScenariosResults("scenarios", __version__, plan.seed, found)
-    write_json(out / "results.json", results)
-    console.print(f"results: {out / 'results.json'}")
-    return 0
+    def finish(self, call: Call[MirrorPlan], found: Outcomes) -> Any:
+        """Records a trial of each view; gathers the results."""
+        plan = call.plan
+        if call.args.all_scenarios:
+            from drake_affetto.experiments.results import ScenariosResults
+
+            results = {name: each.results for name, each in found.items()}
+            return ScenariosResults.of(plan, scenarios=results)
+        outcome = found[plan.scenario]
+        if not call.args.no_media:
+            call.console.print("Recording a direct and a mirrored trial ...")
+            _record(call.out, outcome, plan)
+        return outcome.results
 
 
-def _show(out: Path, outcome: "MirrorOutcome", plan: MirrorPlan) -> None:
+def _record(out: Path, outcome: "MirrorOutcome", plan: MirrorPlan) -> None:
     """Writes media of the first repeat: the skill, and transfer's default."""
     from drake_affetto.experiments.media import ShownTrial, write_media
     from drake_affetto.station.scenario import load_scenario
@@ -119,3 +113,7 @@ def _print(results: "MirrorResults", console: Any) -> None:
         rates = [cells[count].success_rate for count in results.samples]
         table.add_row(name, *map(rate_text, rates))
     console.print(table)
+
+
+_COMMAND = MirrorCommand()
+add_arguments, run = _COMMAND.add_arguments, _COMMAND.run

@@ -1,20 +1,13 @@
 """Options of the commands: those of a plan, and those that studies share."""
 
 import argparse
-from collections.abc import Iterator
-import contextlib
 import dataclasses
 from pathlib import Path
 import typing
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from drake_affetto.common.errors import InputError, require_range
 from drake_affetto.common.fields import option_name
-from drake_affetto.common.output import prepare_output
-
-if TYPE_CHECKING:
-    from drake_affetto.runner.executor import TrialExecutor
-    from drake_affetto.runner.workers import WorkerPool
 
 STORE = "trials.sqlite"
 WORKERS = 2
@@ -98,6 +91,27 @@ def add_seed_argument(
     parser.add_argument("--seed", type=int, default=0, metavar="N", help=text)
 
 
+def add_renamed_flag(
+    parser: argparse.ArgumentParser, name: str, earlier: str, text: str
+) -> None:
+    """Declares a flag that also works, unseen, by its earlier name.
+
+    Args:
+        parser: Parser of the command.
+        name: Name of the flag, e.g. --mouse.
+        earlier: Its name in version 0.1.0.
+        text: Help of the flag.
+    """
+    parser.add_argument(name, action="store_true", help=text)
+    parser.add_argument(
+        earlier,
+        dest=name.removeprefix("--").replace("-", "_"),
+        action="store_true",
+        default=argparse.SUPPRESS,
+        help=argparse.SUPPRESS,
+    )
+
+
 def add_workers_argument(parser: Any) -> None:
     """Declares --workers."""
     parser.add_argument(
@@ -110,6 +124,15 @@ def add_workers_argument(parser: Any) -> None:
     )
 
 
+def add_scenario_argument(
+    parser: argparse.ArgumentParser, name: str = "--scenario", **how: Any
+) -> None:
+    """Declares which scenario is meant; `how` is for argparse."""
+    parser.add_argument(
+        name, default="drumming", help="scenario, by name or YAML file", **how
+    )
+
+
 def add_restart_argument(parser: argparse.ArgumentParser) -> None:
     """Declares --restart."""
     parser.add_argument(
@@ -119,18 +142,8 @@ def add_restart_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_study_arguments(
-    parser: argparse.ArgumentParser, out: str | None
-) -> None:
-    """Declares the options that studies on the robot share.
-
-    Args:
-        parser: Parser of the command.
-        out: Default folder of the results; None where the command declares
-            --out itself.
-    """
-    if out is not None:
-        add_output_argument(parser, out)
+def add_study_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares where a study's trials run and which it takes over."""
     where = parser.add_mutually_exclusive_group()
     add_workers_argument(where)
     where.add_argument(
@@ -165,116 +178,3 @@ def check_study_arguments(args: argparse.Namespace) -> None:
     for folder in args.reuse:
         if not (Path(folder) / STORE).is_file():
             raise InputError(f"--reuse: there is no {STORE} in {folder}")
-
-
-@contextlib.contextmanager
-def tells_how_to_continue(console: Any, out: Path) -> Iterator[None]:
-    """On Ctrl-C, says on the console that the same command continues."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        console.print(
-            f"Finished trials are kept in {out}; the same command goes on "
-            "from there."
-        )
-        raise
-
-
-@contextlib.contextmanager
-def worker_pool(
-    args: argparse.Namespace, scenario: str
-) -> Iterator["WorkerPool"]:
-    """Workers of a study that was called with the shared options.
-
-    Worker processes begin at once to import what they need, while this
-    process does so too.
-
-    Args:
-        args: Parsed options.
-        scenario: Scenario of the first trials, by name or path.
-    """
-    from drake_affetto.experiments.worker import prepare
-    from drake_affetto.runner.workers import WorkerPool
-
-    with contextlib.ExitStack() as stack:
-        cluster = None
-        if getattr(args, "dask", None) is not None:
-            from drake_affetto.experiments.trials import software
-            from drake_affetto.runner.dask_cluster import cluster_executor
-
-            cluster = stack.enter_context(cluster_executor(args.dask, software))
-        pool = stack.enter_context(
-            WorkerPool(
-                worker_count(args),
-                cluster,
-                prepare=prepare,
-                arguments=(scenario,),
-            )
-        )
-        pool.start()
-        yield pool
-
-
-@contextlib.contextmanager
-def trial_executor(
-    args: argparse.Namespace, path: Path, console: Any, pool: "WorkerPool"
-) -> Iterator["TrialExecutor"]:
-    """The executor of a study that was called with the shared options.
-
-    Args:
-        args: Parsed options.
-        path: File of the study's trials.
-        console: A rich console.
-        pool: Workers of the study.
-
-    Yields:
-        An executor whose trials are kept in `path`.
-    """
-    from drake_affetto.experiments.worker import run_task
-    from drake_affetto.runner.executor import TrialExecutor
-    from drake_affetto.runner.store import TrialStore
-
-    with (
-        TrialStore(path) as store,
-        tells_how_to_continue(console, path.parent),
-    ):
-        for folder in args.reuse:
-            taken = store.merge(Path(folder) / STORE)
-            console.print(f"{taken} finished trials taken over from {folder}")
-        with TrialExecutor(run_task, store, pool=pool) as executor:
-            yield executor
-        if executor.reused:
-            console.print(f"{executor.reused} trials were finished already")
-
-
-@contextlib.contextmanager
-def study(
-    args: argparse.Namespace, console: Any, *scenarios: str
-) -> Iterator[tuple[Path, "TrialExecutor"]]:
-    """Folder and executor of a study on the robot.
-
-    The workers start first, for that takes longest. The folder is made only
-    if the scenarios fit.
-
-    Args:
-        args: Parsed options.
-        console: A rich console.
-        scenarios: Scenarios by name or path, that of the first trials first.
-
-    Yields:
-        The folder of the results and the executor of the trials.
-    """
-    with worker_pool(args, scenarios[0]) as pool:
-        with console.status(f"Starting {pool.workers} workers"):
-            from drake_affetto.station.scenario import load_scenario
-
-            for scenario in scenarios:
-                load_scenario(scenario)
-            out = prepare_output(args.out)
-        with trial_executor(args, out / STORE, console, pool) as executor:
-            yield out, executor
-
-
-def rate_text(rate: Any) -> str:
-    """A `SuccessRate` with its interval, for a table."""
-    return f"{rate.mean:4.0%}  [{rate.low:.0%}, {rate.high:.0%}]"

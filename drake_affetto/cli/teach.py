@@ -4,79 +4,72 @@ import argparse
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from drake_affetto.cli.options import (
-    add_plan_arguments,
-    add_study_arguments,
-    check_study_arguments,
-    make_plan,
+from drake_affetto.cli.options import add_renamed_flag
+from drake_affetto.cli.study_command import (
+    StudyCommand,
     trial_executor,
     worker_pool,
 )
-from drake_affetto.common.fields import check_ranges
 from drake_affetto.experiments.plans import TeachPlan
 
 if TYPE_CHECKING:
     from drake_affetto.experiments.results import DemonstrationResult
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declares the command's options."""
-    parser.add_argument(
-        "--out",
-        metavar="FILE",
-        required=True,
-        help="HDF5 file of demonstrations; new ones are added to it",
-    )
-    add_plan_arguments(parser, TeachPlan)
-    parser.add_argument(
-        "--mouse",
-        action="store_true",
-        help="you are the teacher: move the hand with the mouse in a browser",
-    )
-    # Its name in version 0.1.0.
-    parser.add_argument(
-        "--by-hand",
-        dest="mouse",
-        action="store_true",
-        default=argparse.SUPPRESS,
-        help=argparse.SUPPRESS,
-    )
-    add_study_arguments(parser, None)
+class TeachCommand(StudyCommand[TeachPlan]):
+    """Adds demonstrations to a file, of a simulated teacher or a person."""
 
+    plan = TeachPlan
 
-def run(args: argparse.Namespace) -> int:
-    """Teaches; returns the exit code."""
-    plan = make_plan(TeachPlan, args)
-    check_ranges(plan)
-    check_study_arguments(args)
-
-    from rich.console import Console
-
-    from drake_affetto.experiments.teaching import teach
-    from drake_affetto.experiments.teaching_session import TeachingSession
-
-    console = Console()
-    session = TeachingSession(plan, args.out)
-    try:
-        if args.mouse:
-            from drake_affetto.experiments.mouse_teaching import teach_by_mouse
-
-            outcomes = teach_by_mouse(session, console)
-        else:
-            with worker_pool(args, plan.scenario) as pool:
-                outcomes = teach(
-                    session,
-                    lambda path: trial_executor(args, path, console, pool),
-                )
-    except KeyboardInterrupt:
-        console.print(
-            f"{len(session.taught)} of {plan.demonstrations} positions are in "
-            f"{session.path}; the same command goes on from there."
+    def add_options(self, parser: argparse.ArgumentParser) -> None:
+        """Declares the file and who teaches."""
+        parser.add_argument(
+            "--out",
+            metavar="FILE",
+            required=True,
+            help="HDF5 file of demonstrations; new ones are added to it",
         )
-        raise
-    print_outcomes(outcomes, console)
-    console.print(f"{len(session.taught)} demonstrations are in {session.path}")
-    return 0
+        add_renamed_flag(
+            parser,
+            "--mouse",
+            "--by-hand",
+            "you are the teacher: move the hand with the mouse in a browser",
+        )
+
+    def work(
+        self, plan: TeachPlan, args: argparse.Namespace, console: Any
+    ) -> None:
+        """Teaches at the positions that the file does not have."""
+        from drake_affetto.experiments.teaching import teach
+        from drake_affetto.experiments.teaching_session import TeachingSession
+
+        session = TeachingSession(plan, args.out)
+        try:
+            if args.mouse:
+                from drake_affetto.experiments.mouse_teaching import (
+                    teach_by_mouse,
+                )
+
+                outcomes = teach_by_mouse(session, console)
+            else:
+                run = self.runs_trials()
+                with worker_pool(args, plan.scenario) as pool:
+                    outcomes = teach(
+                        session,
+                        lambda path: trial_executor(
+                            args, path, console, pool, run
+                        ),
+                    )
+        except KeyboardInterrupt:
+            console.print(
+                f"{len(session.taught)} of {plan.demonstrations} positions "
+                f"are in {session.path}; the same command goes on from there."
+            )
+            raise
+        print_outcomes(outcomes, console)
+        console.print(
+            f"{len(session.taught)} demonstrations are in {session.path}"
+        )
 
 
 def print_outcomes(
@@ -113,3 +106,7 @@ def print_outcomes(
         f"({first / count:.0%}) at first try; greatest pull "
         f"{max(each.max_pull for each in outcomes):.1f} N"
     )
+
+
+_COMMAND = TeachCommand()
+add_arguments, run = _COMMAND.add_arguments, _COMMAND.run

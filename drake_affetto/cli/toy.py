@@ -1,69 +1,43 @@
 """`affetto toy`: the paper's toy experiment of transfer (Fig. 2)."""
 
-import argparse
 from typing import TYPE_CHECKING, Any
 
-from drake_affetto.cli.options import (
-    STORE,
-    add_output_argument,
-    add_plan_arguments,
-    add_workers_argument,
-    make_plan,
-    tells_how_to_continue,
-    worker_count,
-)
-from drake_affetto.common.fields import check_ranges
-from drake_affetto.common.output import prepare_output, write_json
+from drake_affetto.cli.study_command import Call, StudyCommand
 from drake_affetto.experiments.plans import ToyPlan
 
 if TYPE_CHECKING:
     from drake_affetto.experiments.results import ToyFigures, ToyResults
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declares the command's options."""
-    add_plan_arguments(parser, ToyPlan)
-    add_output_argument(parser, "out/toy")
-    add_workers_argument(parser)
+class ToyCommand(StudyCommand[ToyPlan]):
+    """Transfers a function of two inputs, without the robot."""
 
+    plan = ToyPlan
+    out = "out/toy"
+    trials = "seeds"
 
-def run(args: argparse.Namespace) -> int:
-    """Runs what is missing, prints the tables, writes `results.json`.
+    def scenarios(self, plan: ToyPlan) -> tuple[str, ...]:
+        """None."""
+        return ()
 
-    Raises:
-        InputError: If an option does not fit or the folder cannot be written.
-    """
-    plan = make_plan(ToyPlan, args)
-    check_ranges(plan)
-    workers = worker_count(args)
-    out = prepare_output(args.out)
+    def runs_trials(self) -> Any:
+        """The function that runs one seed."""
+        from drake_affetto.experiments.toy import run_seed
 
-    from rich.console import Console
+        return run_seed
 
-    from drake_affetto.experiments.toy import run_seed, run_toy
-    from drake_affetto.runner.executor import TrialExecutor
-    from drake_affetto.runner.store import TrialStore
+    def study(self, call: Call[ToyPlan]) -> "ToyResults":
+        """Runs what is missing on all domains."""
+        from drake_affetto.experiments.toy import run_toy
 
-    console = Console()
-    with (
-        tells_how_to_continue(console, out),
-        TrialStore(out / STORE) as store,
-        TrialExecutor(
-            run_seed, store, workers=workers, quiet=not console.is_terminal
-        ) as executor,
-    ):
-        results = run_toy(executor, plan)
-        if executor.reused:
-            console.print(
-                f"{executor.reused} seeds were finished already and are kept"
-            )
-    write_json(out / "results.json", results)
-    console.print(make_table(results, "[0, 1]²", paper=True))
-    assert results.wide is not None
-    console.print(make_table(results.wide, "[-1.3, 1.3]²"))
-    console.print(f"f = {results.function}")
-    console.print(f"results: {out / 'results.json'}")
-    return 0
+        return run_toy(call.executor, call.plan)
+
+    def show(self, results: "ToyResults", console: Any) -> None:
+        """Prints the tables of both squares."""
+        console.print(make_table(results, "[0, 1]²", paper=True))
+        assert results.wide is not None
+        console.print(make_table(results.wide, "[-1.3, 1.3]²"))
+        console.print(f"f = {results.function}")
 
 
 def make_table(
@@ -78,7 +52,8 @@ def make_table(
     """
     from rich.table import Table
 
-    from drake_affetto.experiments.toy import BASELINES, PAPER, TRANSFERS
+    from drake_affetto.experiments.results import PAPER
+    from drake_affetto.experiments.toy import BASELINES, TRANSFERS
 
     source = figures.source
     table = Table(
@@ -117,3 +92,7 @@ def make_table(
                 end_section=i == len(names) - 1,
             )
     return table
+
+
+_COMMAND = ToyCommand()
+add_arguments, run = _COMMAND.add_arguments, _COMMAND.run

@@ -8,9 +8,9 @@ from drake_affetto.cli.options import (
     add_restart_argument,
     add_seed_argument,
     add_workers_argument,
-    tells_how_to_continue,
     worker_count,
 )
+from drake_affetto.cli.study_command import tells_how_to_continue
 from drake_affetto.common.errors import require_range
 from drake_affetto.common.output import prepare_output
 from drake_affetto.tuning.config import (

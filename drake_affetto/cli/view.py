@@ -2,14 +2,12 @@
 
 import argparse
 
+from drake_affetto.cli.options import add_scenario_argument
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's options."""
-    parser.add_argument(
-        "--scenario",
-        default="drumming",
-        help="scenario, by name or YAML file",
-    )
+    add_scenario_argument(parser)
     parser.add_argument(
         "--frames",
         action="store_true",

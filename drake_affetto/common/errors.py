@@ -1,5 +1,6 @@
 """Errors that a user can mend, each told in one line."""
 
+from collections.abc import Sequence
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -38,6 +39,21 @@ def require_range(
         expected = f"a number from {low:g} to {high:g}"
     fits = isinstance(value, (int, float)) and low <= value <= high
     require(fits and math.isfinite(value), field, value, expected)
+
+
+def require_choice(field: str, value: Any, *choices: Any) -> None:
+    """Raises InputError unless `value` is one of `choices`."""
+    require(value in choices, field, value, " or ".join(map(repr, choices)))
+
+
+def require_interval(field: str, value: Sequence[float]) -> None:
+    """Raises InputError unless `value` is a lower and a greater upper limit."""
+    require(
+        len(value) == 2 and value[0] < value[1],
+        field,
+        value,
+        "a lower and a greater upper limit",
+    )
 
 
 def require_array(

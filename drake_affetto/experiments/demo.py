@@ -4,18 +4,19 @@ Both learn the same skill from the same demonstrations, which are therefore
 given once. Beside their results the demo leaves pictures, sounds and a replay.
 """
 
+from collections.abc import Sequence
 import contextlib
 import functools
 from pathlib import Path
 from typing import Any
 
-from drake_affetto import __version__
 from drake_affetto.common.output import write_json
 from drake_affetto.experiments.drumming import run_drum
 from drake_affetto.experiments.media import ShownTrial, write_media
 from drake_affetto.experiments.mirror import MirrorOutcome, run_mirror
 from drake_affetto.experiments.plans import DemoPlan
-from drake_affetto.experiments.results import (
+from drake_affetto.experiments.results import DrumResults
+from drake_affetto.experiments.results.demo import (
     DemoDrumming,
     DemoMirror,
     DemoPosition,
@@ -23,7 +24,6 @@ from drake_affetto.experiments.results import (
     DemoScheme,
     DemoTaught,
     DemoTrial,
-    DrumResults,
 )
 from drake_affetto.experiments.trials import run_task
 from drake_affetto.runner.executor import TrialExecutor
@@ -40,6 +40,7 @@ def run_demo(
     pool: WorkerPool | None = None,
     watch: bool = False,
     restart: bool = False,
+    reuse: Sequence[str | Path] = (),
     console: Any = None,
     media: bool = True,
 ) -> DemoResults:
@@ -52,6 +53,7 @@ def run_demo(
         pool: Workers that run already, instead of `workers` new ones.
         watch: Whether to show the trials in Meshcat, in this process.
         restart: Whether to run finished trials again.
+        reuse: Folders of other studies whose finished trials are taken over.
         console: A rich console for messages; None for silence.
         media: Whether to write pictures, sounds and the replay too.
     """
@@ -64,6 +66,8 @@ def run_demo(
         run = functools.partial(run_task, runners=_watched_runners(console))
     with contextlib.ExitStack() as stack:
         store = stack.enter_context(TrialStore(path))
+        for folder in reuse:
+            store.merge(Path(folder) / path.name)
         executor = stack.enter_context(
             TrialExecutor(
                 run, store, workers=workers, pool=pool, quiet=console is None
@@ -119,10 +123,8 @@ def _make_results(
     plan: DemoPlan, drum: DrumResults, outcome: MirrorOutcome
 ) -> DemoResults:
     count = max(plan.mirror.samples)
-    return DemoResults(
-        study="demo",
-        version=__version__,
-        seed=plan.seed,
+    return DemoResults.of(
+        plan,
         drumming=DemoDrumming(
             demonstrations=drum.demonstrations,
             taught=[

@@ -12,7 +12,6 @@ import dataclasses
 
 import numpy as np
 
-from drake_affetto import __version__
 from drake_affetto.experiments.plans import DrumPlan
 from drake_affetto.experiments.results import (
     CurvePoint,
@@ -31,18 +30,15 @@ from drake_affetto.experiments.results import (
 from drake_affetto.experiments.skills import (
     look_at_positions,
     make_skill,
+    run_strikes,
     skills_by_count,
     stack_prototypes,
+    strike_if_seen,
     task_parameters,
     teach_positions,
 )
 from drake_affetto.experiments.statistics import success_rate
-from drake_affetto.experiments.trials import (
-    draw_positions,
-    run_trials,
-    strike,
-    trial_seed,
-)
+from drake_affetto.experiments.trials import draw_positions, trial_seed
 from drake_affetto.runner.executor import Spec, TrialExecutor
 from drake_affetto.sound.config import load_sound_config
 from drake_affetto.sound.separation import separation
@@ -137,17 +133,13 @@ def run_drum(executor: TrialExecutor, plan: DrumPlan) -> DrumResults:
         (plan.seed, _LOOKS),
     )
     tests = _plan_tests(plan, scenario, demonstrations, positions, seen)
-    strikes = run_trials(
-        executor,
-        "Drumming at test positions",
-        {test: spec for test, spec in tests.items() if spec is not None},
-    )
+    strikes = run_strikes(executor, "Drumming at test positions", tests)
     outcomes = [
         _Outcome(
             test,
             tuple(positions[test.position].tolist()),
             seen[test.repeat, test.position].tau,
-            strikes.get(test),
+            strikes[test],
         )
         for test in tests
     ]
@@ -180,17 +172,14 @@ def _plan_tests(
                     # First and last, both orders know the same.
                     continue
                 for position, xy in enumerate(positions):
-                    gaze = seen[repeat, position]
-                    test = _Test(order, repeat, n, position)
-                    tests[test] = None
-                    if gaze.found:
-                        tests[test] = strike(
-                            plan.scenario,
-                            xy,
-                            trial_seed(plan.seed, _STRIKES, repeat, position),
-                            skills[n - 1].predict([gaze.tau])[0],
-                            prototypes,
-                        )
+                    tests[_Test(order, repeat, n, position)] = strike_if_seen(
+                        plan.scenario,
+                        xy,
+                        trial_seed(plan.seed, _STRIKES, repeat, position),
+                        seen[repeat, position],
+                        skills[n - 1],
+                        prototypes,
+                    )
     return tests
 
 
@@ -297,14 +286,8 @@ def _make_results(
         active = LearningCurve(own, demonstrations_needed(own))
     last = [o for o in outcomes if o.test.n == plan.demonstrations]
     attempts = [each.attempts for some in demonstrations for each in some]
-    return DrumResults(
-        study="drum",
-        version=__version__,
-        seed=plan.seed,
-        scenario=plan.scenario,
-        demonstrations=plan.demonstrations,
-        evaluations=plan.evaluations,
-        repeats=plan.repeats,
+    return DrumResults.of(
+        plan,
         taught=[
             TaughtPosition(
                 repeat,

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from drake_affetto import __version__
 from drake_affetto.experiments.drumming import HIDDEN, SOURCE
 from drake_affetto.experiments.plans import MirrorPlan
 from drake_affetto.experiments.results import (
@@ -29,17 +28,14 @@ from drake_affetto.experiments.skills import (
     fit_scheme,
     learn_skill,
     look_at_positions,
+    run_strikes,
     stack_prototypes,
+    strike_if_seen,
     task_parameters,
     teach_positions,
 )
 from drake_affetto.experiments.statistics import compare, success_rate
-from drake_affetto.experiments.trials import (
-    draw_positions,
-    run_trials,
-    strike,
-    trial_seed,
-)
+from drake_affetto.experiments.trials import draw_positions, trial_seed
 from drake_affetto.runner.executor import Spec, TrialExecutor
 from drake_affetto.station.scenario import load_scenario
 
@@ -181,24 +177,16 @@ def run_mirror(executor: TrialExecutor, plan: MirrorPlan) -> MirrorOutcome:
                 shown, shown_samples = schemes, samples
             for name, scheme in schemes.items():
                 for position, xy in enumerate(repeat.positions):
-                    gaze = seen[number, position]
                     test = _Test(name, count, number, position)
-                    # A drum that was not found is not struck.
-                    tests[test] = None
-                    if gaze.found:
-                        tests[test] = strike(
-                            plan.scenario,
-                            xy,
-                            trial_seed(plan.seed, _STRIKES, number, position),
-                            scheme.predict([gaze.tau])[0],
-                            repeat.prototypes,
-                        )
-    strikes = run_trials(
-        executor,
-        f"Drumming, {title}",
-        {test: spec for test, spec in tests.items() if spec is not None},
-    )
-    outcomes = {test: strikes.get(test) for test in tests}
+                    tests[test] = strike_if_seen(
+                        plan.scenario,
+                        xy,
+                        trial_seed(plan.seed, _STRIKES, number, position),
+                        seen[number, position],
+                        scheme,
+                        repeat.prototypes,
+                    )
+    outcomes = run_strikes(executor, f"Drumming, {title}", tests)
     first = repeats[0]
     return MirrorOutcome(
         results=_make_results(plan, outcomes, _map(plan, shown, shown_samples)),
@@ -219,23 +207,20 @@ def _teach(
     title: str,
 ) -> _Repeat:
     """Teaches one repeat: in direct view, then in the changed one."""
-    number = f"{repeat + 1} of {plan.repeats}"
-    more = {"variability": plan.variability, "workspace": plan.workspace}
-    demonstrations = teach_positions(
-        executor,
-        f"Kinesthetic teaching{among}, {number}",
-        plan.direct,
-        plan.demonstrations,
-        (plan.seed, SOURCE, repeat),
-        **more,
-    )
-    pool = teach_positions(
-        executor,
-        f"Kinesthetic teaching, {title}, {number}",
-        plan.scenario,
-        plan.pool_size,
-        (plan.seed, _TARGET, repeat),
-        **more,
+    demonstrations, pool = (
+        teach_positions(
+            executor,
+            f"Kinesthetic teaching{view}, {repeat + 1} of {plan.repeats}",
+            scenario,
+            count,
+            (plan.seed, use, repeat),
+            variability=plan.variability,
+            workspace=plan.workspace,
+        )
+        for view, scenario, count, use in (
+            (among, plan.direct, plan.demonstrations, SOURCE),
+            (f", {title}", plan.scenario, plan.pool_size, _TARGET),
+        )
     )
     return _Repeat(
         skill=learn_skill(
@@ -294,18 +279,8 @@ def _make_results(
                 [s.reward if s else 0.0 for row in strikes for s in row],
             )
         comparisons += compare(successes, count)
-    return MirrorResults(
-        study="mirror",
-        version=__version__,
-        seed=plan.seed,
-        scenario=plan.scenario,
-        samples=list(plan.samples),
-        repeats=plan.repeats,
-        evaluations=plan.evaluations,
-        demonstrations=plan.demonstrations,
-        choice=plan.choice,
-        variability=plan.variability,
-        workspace=plan.workspace,
+    return MirrorResults.of(
+        plan,
         schemes=schemes,
         comparisons=comparisons,
         map=example,

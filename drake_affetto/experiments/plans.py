@@ -5,7 +5,7 @@ Nothing heavy is imported here: a command's help shows a plan's defaults.
 
 import dataclasses
 
-from drake_affetto.common.errors import require, require_range
+from drake_affetto.common.errors import require, require_choice, require_range
 from drake_affetto.common.fields import check_ranges, number, option
 from drake_affetto.skill.scheme_names import PAPER_SCHEMES, STUDY_SCHEMES
 
@@ -13,7 +13,16 @@ GREATEST_SEED = 2**31 - 1
 
 
 @dataclasses.dataclass(frozen=True)
-class DrumPlan:
+class Plan:
+    """The plan of a study; fields with a help are options of its command."""
+
+    def check(self) -> None:
+        """Raises InputError for the first value that does not fit."""
+        check_ranges(self)
+
+
+@dataclasses.dataclass(frozen=True)
+class DrumPlan(Plan):
     """How much the drumming study does.
 
     Attributes:
@@ -48,7 +57,7 @@ class DrumPlan:
 
     def check(self) -> None:
         """Raises InputError for the first value that does not fit."""
-        check_ranges(self)
+        super().check()
         for count in self.after:
             require_range("--after", count, 1, self.demonstrations)
 
@@ -60,7 +69,7 @@ class DrumPlan:
 
 
 @dataclasses.dataclass(frozen=True)
-class MirrorPlan:
+class MirrorPlan(Plan):
     """What is compared in a changed view, and how often.
 
     Attributes:
@@ -109,7 +118,7 @@ class MirrorPlan:
 
     def check(self) -> None:
         """Raises InputError for the first value that does not fit."""
-        check_ranges(self)
+        super().check()
         require(
             len(set(self.samples)) == len(self.samples) > 0,
             "--samples",
@@ -117,16 +126,11 @@ class MirrorPlan:
             "numbers of samples, each once",
         )
         require_range("pool", self.pool_size, max(self.samples), 1000)
-        require(
-            self.choice in ("random", "spread"),
-            "choice",
-            self.choice,
-            "'random' or 'spread'",
-        )
+        require_choice("choice", self.choice, "random", "spread")
 
 
 @dataclasses.dataclass(frozen=True)
-class DemoPlan:
+class DemoPlan(Plan):
     """How much the demo does.
 
     Attributes:
@@ -169,7 +173,7 @@ class DemoPlan:
 
 
 @dataclasses.dataclass(frozen=True)
-class TeachPlan:
+class TeachPlan(Plan):
     """How many demonstrations are taught into a file.
 
     Attributes:
@@ -191,7 +195,7 @@ class TeachPlan:
 
 
 @dataclasses.dataclass(frozen=True)
-class ToyPlan:
+class ToyPlan(Plan):
     """How much the toy experiment does.
 
     Attributes:

@@ -1,6 +1,6 @@
 """The skill and the schemes of transfer, as a scenario sets them up."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 import copy
 import functools
 from typing import TYPE_CHECKING, Any
@@ -11,20 +11,22 @@ from drake_affetto.common.errors import InputError
 from drake_affetto.experiments.results import (
     DemonstrationResult,
     GazeResult,
+    StrikeResult,
 )
 from drake_affetto.experiments.trials import (
     demonstration,
     draw_positions,
     look,
     run_trials,
+    strike,
     trial_seed,
 )
-from drake_affetto.runner.executor import TrialExecutor
+from drake_affetto.runner.executor import Key, Spec, TrialExecutor
 from drake_affetto.station.scenario import SkillConfig, load_scenario
 
 if TYPE_CHECKING:
     from drake_affetto.skill.elm import ElmRegressor
-    from drake_affetto.skill.mappings import Mapping
+    from drake_affetto.skill.mappings import Mapping as MapFamily
 
 # scikit-learn is imported where it is used: the first trials need not wait for
 # it.
@@ -193,6 +195,47 @@ def look_at_positions(
     )
 
 
+def strike_if_seen(
+    scenario: str,
+    xy: Sequence[float],
+    seed: int,
+    gaze: GazeResult,
+    skill: Any,
+    prototypes: np.ndarray,
+) -> Spec | None:
+    """The spec of a strike as a skill makes it; None without a drum in sight.
+
+    Args:
+        scenario: Scenario, by name or path.
+        xy: Position of the drum (2,), m.
+        seed: Seed of the noise.
+        gaze: What the gaze found there.
+        skill: Fitted regressor from τ to θ.
+        prototypes: Prototypes of the reward (N, bands, frames).
+    """
+    if not gaze.found:
+        return None
+    return strike(scenario, xy, seed, skill.predict([gaze.tau])[0], prototypes)
+
+
+def run_strikes(
+    executor: TrialExecutor, label: str, tests: Mapping[Key, Spec | None]
+) -> dict[Key, StrikeResult | None]:
+    """Runs the strikes of a study; None stays None.
+
+    Args:
+        executor: Executor of the study.
+        label: Name of this phase of the study.
+        tests: Specs of `strike_if_seen`, by key.
+    """
+    strikes = run_trials(
+        executor,
+        label,
+        {test: spec for test, spec in tests.items() if spec is not None},
+    )
+    return {test: strikes.get(test) for test in tests}
+
+
 def fit_scheme(
     name: str,
     source: "ElmRegressor",
@@ -228,7 +271,7 @@ def fit_scheme(
 
 
 @functools.cache
-def _mapping(scenario: str, name: str) -> "str | Mapping":
+def _mapping(scenario: str, name: str) -> "str | MapFamily":
     """The family of maps that a scenario names."""
     if name != "optical":
         return name

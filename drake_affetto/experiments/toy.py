@@ -27,15 +27,12 @@ import warnings
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_affetto import __version__
 from drake_affetto.common.typing import Array
 from drake_affetto.experiments.plans import ToyPlan
 from drake_affetto.experiments.results import (
+    PAPER,
     ToyFigures,
     ToyMethod,
-    ToyPaper,
-    ToyPaperSource,
-    ToyPaperTransfer,
     ToyResults,
     ToySource,
 )
@@ -45,17 +42,6 @@ T = TypeVar("T", ToySource, ToyMethod)
 
 # Counted up whenever the same seed gives other numbers than before.
 _REVISION = 2
-
-# As printed in the paper: mean and standard deviation over 100 repeats.
-PAPER = ToyPaper(
-    ToyPaperSource(train_mse=0.00, test_mse=0.06, rotated_mse=41.71),
-    ToyPaperTransfer(
-        train_mse_mean=0.001,
-        train_mse_std=0.001,
-        other_mse_mean=0.354,
-        other_mse_std=0.661,
-    ),
-)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -272,12 +258,8 @@ def run_toy(executor: TrialExecutor, plan: ToyPlan) -> ToyResults:
     }
     # The paper's experiment at the top, the harder one beside it.
     unit = found["unit"]
-    return ToyResults(
-        study="toy",
-        version=__version__,
-        seed=plan.seed,
-        seeds=plan.seeds,
-        repeats=plan.repeats,
+    return ToyResults.of(
+        plan,
         function=FUNCTION,
         paper=PAPER,
         source=unit.source,

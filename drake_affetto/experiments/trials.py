@@ -33,7 +33,7 @@ from drake_affetto.experiments.episode import (
     Recording,
     TrialRunner,
 )
-from drake_affetto.experiments.results import (
+from drake_affetto.experiments.results.trial import (
     DemonstrationResult,
     DrummingResult,
     GazeResult,

@@ -15,6 +15,7 @@ import plotly.graph_objects as go
 from drake_affetto.experiments.results import (
     SuccessRate,
 )
+from drake_affetto.report import wording
 
 # By name; every value occurs once, so that either can be told from the other.
 # The schemes' are chosen to differ for color-blind eyes too, and each has a
@@ -133,6 +134,23 @@ def scheme_marker(name: str) -> dict[str, Any]:
     }
 
 
+def scheme_points(name: str, hover: str, **how: Any) -> go.Scatter:
+    """A scheme's points, with its color, symbol and name.
+
+    Args:
+        name: Scheme.
+        hover: What is shown at a point that is touched, as plotly's template.
+        how: Further arguments of plotly's scatter.
+    """
+    label = escaped(wording.scheme(name))
+    look = {"mode": "markers", "marker": scheme_marker(name)}
+    return go.Scatter(
+        name=label,
+        hovertemplate=f"{hover}<extra>{label}</extra>",
+        **(look | how),
+    )
+
+
 def whiskers(rates: Sequence[SuccessRate]) -> dict[str, Any]:
     """Confidence intervals of rates, for points in percent."""
     return {
@@ -205,6 +223,21 @@ def percent_axis(title: str = "success", **more: Any) -> dict[str, Any]:
     }
 
 
+def places_axis(labels: Sequence[str], after: float = 0.5) -> dict[str, Any]:
+    """An axis with a place for each label, 0, 1, ... from the top down.
+
+    Args:
+        labels: Labels of the places.
+        after: Room after the last place.
+    """
+    return {
+        "tickvals": list(range(len(labels))),
+        "ticktext": list(labels),
+        "range": [len(labels) - 1 + after, -0.5],
+        "showgrid": False,
+    }
+
+
 def reference_line(
     value: float, label: str, color: str, *, vertical: bool, position: str
 ) -> dict[str, dict[str, Any]]:
@@ -237,6 +270,22 @@ def reference_line(
             "xshift": 5 if vertical else 0,
         },
     }
+
+
+def threshold_line(
+    threshold: float,
+    *,
+    vertical: bool,
+    color: str = LIGHT["muted"],
+    position: str = "start",
+) -> dict[str, Any]:
+    """Parts of a figure that show the reward above which a trial succeeds."""
+    label = f"R = {threshold:g}"
+    return with_lines(
+        reference_line(
+            threshold, label, color, vertical=vertical, position=position
+        )
+    )
 
 
 def with_lines(*lines: dict[str, dict[str, Any]]) -> dict[str, Any]:

@@ -8,7 +8,13 @@ from typing import Any
 from pydrake.multibody.plant import MultibodyPlantConfig
 from pydrake.systems.analysis import SimulatorConfig
 
-from drake_affetto.common.errors import InputError, require, require_range
+from drake_affetto.common.errors import (
+    InputError,
+    require,
+    require_choice,
+    require_interval,
+    require_range,
+)
 from drake_affetto.common.resources import models_dir
 from drake_affetto.common.yaml_config import read_yaml, typed
 from drake_affetto.control.pidf_controller import PidfConfig
@@ -45,13 +51,7 @@ class DrumRegion:
     def check(self, where: str) -> None:
         """Raises InputError unless both are intervals."""
         for name in ("x", "y"):
-            value = getattr(self, name)
-            require(
-                len(value) == 2 and value[0] < value[1],
-                f"{where}.{name}",
-                value,
-                "a lower and a greater upper limit",
-            )
+            require_interval(f"{where}.{name}", getattr(self, name))
 
 
 @dataclasses.dataclass
@@ -70,12 +70,7 @@ class LookConfig:
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that does not fit."""
-        require(
-            self.mode in ("centre", "fixed_yaw"),
-            f"{where}.mode",
-            self.mode,
-            "'centre' or 'fixed_yaw'",
-        )
+        require_choice(f"{where}.mode", self.mode, "centre", "fixed_yaw")
         require_range(f"{where}.fixed_yaw", self.fixed_yaw, -1.6, 1.6)
 
 
@@ -244,18 +239,13 @@ class Scenario:
             self.yaw_joint,
             f"one of the active joints {', '.join(self.active_joints)}",
         )
-        require(
-            self.motion_source in ("skill", "external"),
-            f"{where}.motion_source",
-            self.motion_source,
-            "'skill' or 'external'",
-        )
-        require(
-            self.valve_source in ("pidf", "external"),
-            f"{where}.valve_source",
-            self.valve_source,
-            "'pidf' or 'external'",
-        )
+        for name, usual in (
+            ("motion_source", "skill"),
+            ("valve_source", "pidf"),
+        ):
+            require_choice(
+                f"{where}.{name}", getattr(self, name), usual, "external"
+            )
         require(
             self.valve_source == "external" or self.pneumatics.mode == "flow",
             f"{where}.pneumatics.mode",

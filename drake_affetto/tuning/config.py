@@ -7,7 +7,7 @@ these classes and fields stay as they are.
 import dataclasses
 from pathlib import Path
 
-from drake_affetto.common.errors import require
+from drake_affetto.common.errors import require, require_interval
 from drake_affetto.common.fields import check_ranges, number
 
 DEFAULT_FILE = "package://drake_affetto/tuning.yaml"
@@ -229,12 +229,7 @@ class TuningConfig:
         pairs["trapezoids.ramp"] = self.trapezoids.ramp
         pairs["trapezoids.hold"] = self.trapezoids.hold
         for name, pair in pairs.items():
-            require(
-                len(pair) == 2 and pair[0] < pair[1],
-                f"{where}.{name}",
-                pair,
-                "a lower and a greater upper value",
-            )
+            require_interval(f"{where}.{name}", pair)
 
 
 def load_tuning(file: str | Path = DEFAULT_FILE) -> TuningConfig:

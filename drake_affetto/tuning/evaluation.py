@@ -8,7 +8,6 @@ import numpy as np
 import optuna
 from optuna.trial import FrozenTrial, TrialState
 
-from drake_affetto import __version__
 from drake_affetto.common.typing import Array
 from drake_affetto.control.pidf import PidfGains, load_control
 from drake_affetto.tuning.config import HELD_OUT, REST, TRAINING
@@ -106,14 +105,8 @@ def make_results(
     count = dict.fromkeys(TrialState, 0)
     for trial in study.get_trials(deepcopy=False):
         count[trial.state] += 1
-    return TuningResults(
-        study="tune",
-        version=__version__,
-        seed=plan.seed,
-        scenario=plan.scenario,
-        start=plan.start,
-        tuning=plan.tuning,
-        joints=list(plan.joints),
+    return TuningResults.of(
+        plan,
         trials=TrialCounts(
             finished=count[TrialState.COMPLETE] + count[TrialState.PRUNED],
             complete=count[TrialState.COMPLETE],

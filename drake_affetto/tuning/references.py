@@ -155,16 +155,38 @@ def _samples(config: TuningConfig, duration: float) -> Array:
     return np.arange(1, count + 1) / config.sample_rate
 
 
-def _move(
-    config: TuningConfig, begin: Array, end: Array, duration: float
-) -> Array:
-    blend = minimum_jerk(_samples(config, duration) / duration)[:, None]
-    return begin + blend * (end - begin)
+class _Path:
+    """A reference that is put together part by part, from the start posture.
 
+    Attributes:
+        at: Where it has come to, (n,), rad.
+    """
 
-def _hold(config: TuningConfig, at: Array, duration: float) -> Array:
-    """Samples of a rest, (T, n)."""
-    return np.repeat(at[None], len(_samples(config, duration)), axis=0)
+    def __init__(self, config: TuningConfig, space: JointRange):
+        self._config = config
+        self._parts = [space.start[None]]
+        self.at = space.start
+        self.hold(config.settling)
+
+    def hold(self, duration: float) -> None:
+        """Rests for a time, s."""
+        count = len(_samples(self._config, duration))
+        self._parts.append(np.repeat(self.at[None], count, axis=0))
+
+    def move(self, to: Array, duration: float, rest: float = 0.0) -> None:
+        """Moves to the posture `to`, (n,), rad, in a time, s, and rests."""
+        blend = minimum_jerk(_samples(self._config, duration) / duration)
+        self._parts.append(self.at + blend[:, None] * (to - self.at))
+        self.at = to
+        self.hold(rest)
+
+    def wave(self, angles: Array) -> None:
+        """Follows angles, (T, n), rad, that end where they have begun."""
+        self._parts.append(angles)
+
+    def finish(self, name: str) -> Reference:
+        """The whole as a reference."""
+        return _finish(name, self._config, np.concatenate(self._parts))
 
 
 def _directions(n: int) -> Array:
@@ -181,13 +203,9 @@ def _fade(t: Array, duration: float, ramp: float) -> Array:
 def _sines_and_steps(config: TuningConfig, space: JointRange) -> Reference:
     n = space.start.size
     sines, steps = config.sines, config.steps
-    middle = space.angle(np.zeros(n))
+    path = _Path(config, space)
     # About the middle of the range, where there is room to both sides.
-    parts = [
-        space.start[None],
-        _hold(config, space.start, config.settling),
-        _move(config, space.start, middle, config.approach),
-    ]
+    path.move(space.angle(np.zeros(n)), config.approach)
     t = _samples(config, sines.duration)
     slow = np.linspace(sines.low, sines.high, n)
     # Neighboring joints should not have neighboring frequencies.
@@ -197,22 +215,17 @@ def _sines_and_steps(config: TuningConfig, space: JointRange) -> Reference:
     wave = wave + sines.share * np.sin(sines.ratio * phase)
     ramp = min(0.5, 0.25 * sines.duration)
     wave = wave * _directions(n) * _fade(t, sines.duration, ramp)
-    parts.append(space.angle(wave))
-    at = middle
+    path.wave(space.angle(wave))
     for level in steps.levels:
         to = space.angle(level * _directions(n))
-        parts.append(_move(config, at, to, steps.rise))
-        parts.append(_hold(config, to, steps.hold))
-        at = to
-    parts.append(_move(config, at, space.start, 2.0 * steps.rise))
-    parts.append(_hold(config, space.start, config.tail))
-    return _finish(TRAINING, config, np.concatenate(parts))
+        path.move(to, steps.rise, steps.hold)
+    path.move(space.start, 2.0 * steps.rise, config.tail)
+    return path.finish(TRAINING)
 
 
 def _chirp(config: TuningConfig, space: JointRange) -> Reference:
     n = space.start.size
     chirp = config.chirp
-    middle = space.angle(np.zeros(n))
     t = _samples(config, chirp.duration)
     slope = (chirp.high - chirp.low) / chirp.duration
     # Phases of the joints are spread over the circle; the sine is faded in
@@ -221,15 +234,11 @@ def _chirp(config: TuningConfig, space: JointRange) -> Reference:
     phase = 2.0 * np.pi * (chirp.low * t + 0.5 * slope * t**2)
     wave = 0.9 * np.sin(phase[:, None] + shift)
     wave = wave * _fade(t, chirp.duration, min(1.0, 0.25 * chirp.duration))
-    parts = [
-        space.start[None],
-        _hold(config, space.start, config.settling),
-        _move(config, space.start, middle, config.approach),
-        space.angle(wave),
-        _move(config, middle, space.start, config.approach),
-        _hold(config, space.start, config.tail),
-    ]
-    return _finish("chirp", config, np.concatenate(parts))
+    path = _Path(config, space)
+    path.move(space.angle(np.zeros(n)), config.approach)
+    path.wave(space.angle(wave))
+    path.move(space.start, config.approach, config.tail)
+    return path.finish("chirp")
 
 
 def _strokes(config: TuningConfig, space: JointRange) -> Reference:
@@ -237,20 +246,16 @@ def _strokes(config: TuningConfig, space: JointRange) -> Reference:
     strokes = config.strokes
     rng = np.random.default_rng(strokes.seed)
     start = space.start
-    parts = [start[None], _hold(config, start, config.settling)]
+    path = _Path(config, space)
     for _ in range(strokes.count):
         # A stroke moves each joint by a part of its range.
         to = start + rng.uniform(0.2, 0.8, n) * (
             np.where(rng.random(n) < 0.5, space.low, space.high) - start
         )
-        parts += [
-            _move(config, start, to, strokes.stroke),
-            _hold(config, to, strokes.dwell),
-            _move(config, to, start, strokes.back),
-            _hold(config, start, strokes.pause),
-        ]
-    parts.append(_hold(config, start, config.tail))
-    return _finish("strokes", config, np.concatenate(parts))
+        path.move(to, strokes.stroke, strokes.dwell)
+        path.move(start, strokes.back, strokes.pause)
+    path.hold(config.tail)
+    return path.finish("strokes")
 
 
 def _trapezoids(config: TuningConfig, space: JointRange) -> Reference:
@@ -280,14 +285,10 @@ def _trapezoids(config: TuningConfig, space: JointRange) -> Reference:
 
 
 def _postures(config: TuningConfig, space: JointRange) -> Reference:
-    n = space.start.size
     shape = config.postures
     rng = np.random.default_rng(shape.seed)
-    at = space.start
-    parts = [at[None], _hold(config, at, config.settling)]
+    path = _Path(config, space)
     for _ in range(shape.count):
-        to = space.angle(rng.uniform(-0.9, 0.9, n))
-        parts.append(_move(config, at, to, shape.move))
-        parts.append(_hold(config, to, shape.hold))
-        at = to
-    return _finish(REST, config, np.concatenate(parts))
+        to = space.angle(rng.uniform(-0.9, 0.9, space.start.size))
+        path.move(to, shape.move, shape.hold)
+    return path.finish(REST)

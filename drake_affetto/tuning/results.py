@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping
 import dataclasses
+from typing import ClassVar
 
 from drake_affetto.common.errors import require
+from drake_affetto.common.study_results import StudyResults
 from drake_affetto.tuning.config import HELD_OUT, TRAINING
 
 DETAILS_FILE = "details.json"
@@ -66,13 +68,10 @@ class TrialCounts:
 
 
 @dataclasses.dataclass(frozen=True)
-class TuningResults:
+class TuningResults(StudyResults):
     """The content of results.json.
 
     Attributes:
-        study: Kind of the study: "tune".
-        version: Version that made the results.
-        seed: Seed of the search.
         scenario: Name or file of the scenario.
         start: File of the gains that the search started from.
         tuning: File of references, cost and search.
@@ -85,9 +84,8 @@ class TuningResults:
         held_out_improvement: The same for each held-out reference.
     """
 
-    study: str
-    version: str
-    seed: int
+    KIND: ClassVar[str] = "tune"
+
     scenario: str
     start: str
     tuning: str

@@ -192,3 +192,58 @@ def test_reader_of_the_pipe_may_leave(buffered):
     finally:
         os.close(write)
     assert (done.returncode, done.stderr) == (141, "")
+
+
+BAD_OPTIONS = [
+    ("demo", "--seed -1", "--seed"),
+    ("demo", "--reuse nowhere", "no trials.sqlite in nowhere"),
+    ("drum", "--demonstrations 2", "--demonstrations"),
+    ("drum", "--evaluations 0", "--evaluations"),
+    ("drum", "--repeats 0", "--repeats"),
+    ("drum", "--after 3 26", "--after"),
+    ("drum", "--workers -1", "--workers"),
+    ("drum", "--scenario drummin", "did you mean 'drumming'"),
+    ("drum", "--reuse nowhere", "no trials.sqlite in nowhere"),
+    ("mirror", "--samples 1", "--samples"),
+    ("mirror", "--samples 3 3", "--samples"),
+    ("mirror", "--repeats 0", "--repeats"),
+    ("mirror", "--scenario miror", "did you mean 'mirror'"),
+    ("mirror", "--scenario mirror --all-scenarios", "not allowed"),
+    ("mirror", "--workers 2 --dask here", "not allowed"),
+    ("mirror", "--dask tcp://127.0.0.1:9", "no Dask scheduler answers"),
+    ("toy", "--repeats 0", "--repeats"),
+    ("toy", "--seeds 0", "--seeds"),
+    ("toy", "--seed -1", "--seed"),
+    ("toy", "--workers -1", "--workers"),
+    ("toy", "--dask tcp://127.0.0.1:9", "no Dask scheduler answers"),
+    ("tune", "--trials 0", "--trials"),
+    ("tune", "--workers -1", "--workers"),
+    ("tune", "--seed -1", "--seed"),
+    ("tune", "--joints elbow", "--joints"),
+    ("tune", "--joints waist_yaw waist_yaw", "--joints"),
+    # A joint of the robot, but locked in this scenario.
+    ("tune", "--joints left_elbow_flexion", "--joints"),
+    ("tune", "--scenario drumning", "drumming"),
+    ("tune", "--start no_such.yaml", "no_such.yaml"),
+    ("tune", "--tuning no_such.yaml", "no_such.yaml"),
+]
+
+
+@pytest.mark.parametrize(("name", "options", "word"), BAD_OPTIONS)
+def test_bad_options_are_one_line_before_anything_runs(
+    name, options, word, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr("drake_affetto.runner.dask_cluster._PATIENCE", 0.5)
+    out = tmp_path / "out"
+    assert cli.main([name, "--out", str(out), *options.split()]) == 2
+    error = capsys.readouterr().err
+    assert word in error
+    assert error.count("\n") == 1
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("name", ["demo", "drum", "mirror", "toy", "tune"])
+def test_a_file_is_no_folder_for_results(name, tmp_path, capsys):
+    (tmp_path / "file").touch()
+    assert cli.main([name, "--out", str(tmp_path / "file")]) == 2
+    assert "is a file" in capsys.readouterr().err

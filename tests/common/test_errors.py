@@ -8,7 +8,9 @@ from drake_affetto.common.errors import (
     InputError,
     require,
     require_array,
+    require_choice,
     require_file,
+    require_interval,
     require_range,
 )
 
@@ -106,3 +108,13 @@ def test_a_large_array_is_not_printed():
     with pytest.raises(InputError) as caught:
         require_array("theta", theta, (120,))
     assert str(caught.value) == "theta[17] is nan, expected a finite number"
+
+
+def test_choices_and_intervals_are_told():
+    require_choice("mode", "b", "a", "b")
+    with pytest.raises(InputError, match=r"^mode is 'c', expected 'a' or 'b'$"):
+        require_choice("mode", "c", "a", "b")
+    require_interval("x", [1.0, 2.0])
+    for pair in ([2.0, 1.0], [1.0, 1.0], [1.0], [1.0, 2.0, 3.0]):
+        with pytest.raises(InputError, match="a lower and a greater upper"):
+            require_interval("x", pair)

@@ -2,11 +2,9 @@
 
 import dataclasses
 
-import cv2
 import numpy as np
 import pytest
 
-from drake_affetto.cli.main import main
 from drake_affetto.experiments.camera_preview import (
     make_gaze_geometry,
     region_grid,
@@ -26,19 +24,6 @@ def keeps_calibration(name):
     )
 
 
-@pytest.mark.parametrize("name", ["drumming", "mirror"])
-def test_it_draws_what_the_camera_sees(name, tmp_path, capsys):
-    assert main(["look", name, "--out", str(tmp_path)]) == 0
-    words = capsys.readouterr().out
-    assert ("in the mirror" in words) == (name == "mirror")
-    assert "tau:" in words
-    for picture in ("start.png", "look.png"):
-        image = cv2.imread(str(tmp_path / picture))
-        assert image.shape == (720, 960, 3)
-        # The blob's circle is there.
-        assert np.any(np.all(image == (255, 0, 255), axis=2))
-
-
 @pytest.mark.parametrize(
     "name", [n for n in scenario_names() if not keeps_calibration(n)]
 )
@@ -55,26 +40,6 @@ def test_the_scenarios_calibration_is_the_computed_one(name):
     tau = sight.task_parameters(region_grid(scenario, 4), computed)
     image = tau if sight.fixed_yaw is not None else tau[:, :1]
     assert np.all((image > 0) & (image < 1))
-
-
-def test_calibrate_prints_yaml(capsys, tmp_path):
-    assert main(["look", "mirror", "--calibrate"]) == 0
-    path = tmp_path / "own.yaml"
-    path.write_text("extends: mirror\n" + capsys.readouterr().out)
-    own = load_scenario(path)
-    assert own.blob.calibration == load_scenario("mirror").blob.calibration
-
-
-def test_a_drum_that_cannot_be_looked_at_is_refused(capsys, tmp_path):
-    for place, words in (
-        (["0.2", "0.35"], "cannot be centered"),
-        (["2.0", "0.0"], "drum position"),
-    ):
-        options = ["--drum", *place, "--out", str(tmp_path)]
-        assert main(["look", *options]) == 2
-        assert words in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []
-    assert main(["look", "nowhere"]) == 2
 
 
 @pytest.mark.parametrize("name", ["drumming", "mirror"])
@@ -105,13 +70,3 @@ def test_the_gaze_settles_on_the_true_task_parameter(name):
     if name == "drumming":
         pixel = np.array([pixel[1], scenario.camera.model().focal_x])
     assert np.abs((tau - taus[0]) * pixel).max() < 0.4
-
-
-def test_a_video_shows_the_gaze_at_work(tmp_path):
-    options = ["--video", "--out", str(tmp_path), "--drum", "0.24", "-0.09"]
-    assert main(["look", "drumming", *options]) == 0
-    video = cv2.VideoCapture(str(tmp_path / "gaze.mp4"))
-    frames = 0
-    while video.read()[0]:
-        frames += 1
-    assert frames > 20

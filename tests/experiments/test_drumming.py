@@ -12,7 +12,6 @@ import time
 import numpy as np
 import pytest
 
-from drake_affetto.cli.main import main
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.typed_json import to_plain
 from drake_affetto.experiments.drumming import (
@@ -231,27 +230,6 @@ def test_a_small_study_on_the_robot(tmp_path):
     assert results["separation"]["false_hits"] == 0
     assert results["separation"]["missed_hits"] == 0
     assert results["by_demonstrations"][-1]["success_rate"]["mean"] > 0.0
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--demonstrations", "2"], "--demonstrations"),
-        (["--evaluations", "0"], "--evaluations"),
-        (["--repeats", "0"], "--repeats"),
-        (["--after", "3", "26"], "--after"),
-        (["--workers", "-1"], "--workers"),
-        (["--scenario", "drummin"], "did you mean 'drumming'"),
-        (["--reuse", "nowhere"], "no trials.sqlite in nowhere"),
-    ],
-)
-def test_bad_options_end_before_anything_runs(
-    tmp_path, capsys, options, message
-):
-    out = tmp_path / "out"
-    assert main(["drum", "--out", str(out), *options]) == 2
-    assert message in capsys.readouterr().err
-    assert not out.exists()
 
 
 def test_a_teacher_who_always_fails_is_an_error(tmp_path):

@@ -7,7 +7,6 @@ import json
 import numpy as np
 import pytest
 
-from drake_affetto.cli.main import main
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.typed_json import to_plain
 from drake_affetto.experiments.mirror import choose, run_mirror
@@ -194,22 +193,3 @@ def test_a_small_study_on_the_robot(tmp_path):
     for scheme in results["schemes"].values():
         assert len(scheme["2"]["rewards"]) == 1
     assert results["map"]["input_names"] == ["x_img", "y_img"]
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--samples", "1"], "--samples"),
-        (["--samples", "3", "3"], "--samples"),
-        (["--repeats", "0"], "--repeats"),
-        (["--scenario", "miror"], "did you mean 'mirror'"),
-        (["--scenario", "mirror", "--all-scenarios"], "not allowed"),
-        (["--workers", "2", "--dask", "here"], "not allowed"),
-        (["--dask", "tcp://127.0.0.1:9"], "no Dask scheduler answers"),
-    ],
-)
-def test_bad_options_are_told(tmp_path, capsys, options, message, monkeypatch):
-    monkeypatch.setattr("drake_affetto.runner.dask_cluster._PATIENCE", 0.5)
-    out = tmp_path / "out"
-    assert main(["mirror", "--out", str(out), *options]) == 2
-    assert message in capsys.readouterr().err

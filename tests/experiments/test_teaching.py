@@ -19,14 +19,11 @@ from drake_affetto.cli.teach import print_outcomes
 from drake_affetto.common.errors import InputError
 from drake_affetto.experiments import trials as tasks
 from drake_affetto.experiments.plans import TeachPlan
-from drake_affetto.experiments.results import DemonstrationResult
 from drake_affetto.experiments.teaching import teach
 from drake_affetto.experiments.teaching_session import TeachingSession
 from drake_affetto.runner.executor import TrialExecutor
 from drake_affetto.runner.store import TrialStore
 from drake_affetto.teaching.demonstrations import (
-    Demonstration,
-    append_demonstration,
     read_demonstrations,
 )
 
@@ -235,62 +232,12 @@ def test_a_file_of_another_session_is_refused(
     assert path.read_bytes() == before
 
 
-def test_files_of_others_are_refused(tmp_path, monkeypatch):
-    path = tmp_path / "taught.h5"
-
-    def holds(**changes):
-        path.unlink(missing_ok=True)
-        values = {
-            "t": [0.0, 1.0],
-            "q": np.zeros((2, 1)),
-            "joint_names": ["waist_yaw"],
-            "drum_xy": [0.2, -0.1],
-            "scenario": "drumming",
-            "seed": 0,
-        }
-        append_demonstration(path, Demonstration(**{**values, **changes}))
-
-    holds(version="0.0.0")
-    with pytest.raises(InputError, match=r"version 0\.0\.0, not"):
-        session(path)
-    holds(seed=None)
-    with pytest.raises(InputError, match="seed None, not 0"):
-        session(path)
-    holds()
-    with pytest.raises(InputError, match="other positions"):
-        session(path)
-    path.write_text("t, q0\n")
-    with pytest.raises(InputError, match="no HDF5 file"):
-        session(path)
-    with pytest.raises(InputError, match="not a folder"):
-        session(tmp_path)
-
-
-def test_a_robot_that_does_not_move_by_itself_cannot_be_taught(tmp_path):
-    path = tmp_path / "mine.yaml"
-    path.write_text("extends: drumming\nmotion_source: external\n")
-    with pytest.raises(InputError, match="motion_source"):
-        session(tmp_path / "t.h5", scenario=str(path))
-
-
 def test_two_at_one_file_are_noticed(tmp_path, trials):
     path = tmp_path / "taught.h5"
     one, other = session(path, 2), session(path, 2)
     taught_here(one)
     with pytest.raises(InputError, match="another process"):
         taught_here(other)
-
-
-def test_a_drum_that_is_not_seen_is_reported():
-    buffer = io.StringIO()
-    nothing = np.zeros(0)
-    unseen = DemonstrationResult(
-        *([0.2, 0.0], False, [0.0, 0.0], 0, False, 0.0, 0.0),
-        *(nothing, nothing, nothing),
-    )
-    print_outcomes([unseen], Console(file=buffer, width=100))
-    assert "drum not seen" in buffer.getvalue()
-    print_outcomes([], Console(file=buffer, width=100))
 
 
 @pytest.mark.slow

@@ -1,24 +1,14 @@
 """The toy experiment: its data, its resumption, its results."""
 
-import argparse
-import json
 import math
 
 import numpy as np
 from numpy.testing import assert_allclose
 import pytest
 
-from drake_affetto.cli import toy as command
-from drake_affetto.common.errors import InputError
 from drake_affetto.common.typed_json import to_plain
 from drake_affetto.experiments import toy
 from drake_affetto.experiments.plans import ToyPlan
-
-
-def arguments(*words):
-    parser = argparse.ArgumentParser()
-    command.add_arguments(parser)
-    return parser.parse_args(words)
 
 
 def test_function():
@@ -75,69 +65,3 @@ def test_transfers_beat_what_they_should():
     spread = figures["transfer"]["default"]["per_seed"]["other_mse_mean"]
     assert len(spread) == 3
     assert error["default"] == np.median(spread)
-
-
-def test_run_resumes_and_repeats(tmp_path, capsys):
-    words = ["--repeats", "2", "--workers", "0", "--out"]
-    first, second = tmp_path / "first", tmp_path / "second"
-    assert command.run(arguments("--seeds", "1", *words, str(first))) == 0
-    capsys.readouterr()
-    # One of two seeds is there already.
-    assert command.run(arguments("--seeds", "2", *words, str(first))) == 0
-    assert "2 seeds were finished already" in capsys.readouterr().out
-    assert command.run(arguments("--seeds", "2", *words, str(second))) == 0
-    results = [(d / "results.json").read_bytes() for d in (first, second)]
-    assert results[0] == results[1]
-
-
-def test_results(tmp_path, capsys):
-    command.run(
-        arguments(
-            *("--repeats", "2", "--seeds", "2", "--seed", "7"),
-            *("--workers", "0", "--out", str(tmp_path)),
-        )
-    )
-    results = json.loads((tmp_path / "results.json").read_text())
-    assert results["seed"] == 7
-    assert results["repeats"] == 2
-    for figures in (results, results["wide"]):
-        assert {"train_mse", "test_mse", "rotated_mse"} <= set(
-            figures["source"]
-        )
-        assert {"paper_single_start", "default"} <= set(figures["transfer"])
-        assert {"relearn", "gaussian_process", "affine_regression"} <= set(
-            figures["baselines"]
-        )
-        for group in ("transfer", "baselines"):
-            for row in figures[group].values():
-                for key in ("train_mse", "other_mse"):
-                    for kind in ("mean", "std"):
-                        value = row[f"{key}_{kind}"]
-                        seeds = row["per_seed"][f"{key}_{kind}"]
-                        assert value == np.median(seeds)
-                        assert len(seeds) == 2
-    printed = capsys.readouterr().out
-    assert "41.71" in printed
-    assert "linear regression" in printed
-
-
-@pytest.mark.parametrize(
-    ("words", "named"),
-    [
-        (["--repeats", "0"], "--repeats"),
-        (["--seeds", "0"], "--seeds"),
-        (["--seed", "-1"], "--seed"),
-        (["--workers", "-1"], "--workers"),
-    ],
-)
-def test_bad_options_are_named(tmp_path, words, named):
-    with pytest.raises(InputError, match=named):
-        command.run(arguments(*words, "--out", str(tmp_path / "out")))
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_folder_that_cannot_be_written_is_named(tmp_path):
-    blocked = tmp_path / "file"
-    blocked.write_text("")
-    with pytest.raises(InputError, match="file"):
-        command.run(arguments("--out", str(blocked)))

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from drake_affetto.common.errors import InputError
-from drake_affetto.experiments import results, trials
+from drake_affetto.experiments import trials
 from drake_affetto.experiments.episode import GazeOutcome
+from drake_affetto.experiments.results import trial as results
 from drake_affetto.runner.store import trial_key
 from drake_affetto.station.scenario import load_scenario
 from support import fake_world
@@ -136,18 +137,6 @@ def test_a_trial_is_known_by_all_that_determines_it(tmp_path):
     trials._fingerprint.cache_clear()
 
 
-def test_results_go_to_the_store_and_back(demonstration):
-    plain, arrays = demonstration
-    typed = results.unpack("demonstration", plain, arrays)
-    assert typed.xy == XY
-    again, more = results.pack(typed)
-    assert again == plain
-    for name, array in arrays.items():
-        np.testing.assert_array_equal(more[name], array)
-    with pytest.raises(InputError, match="'dance'"):
-        results.unpack("dance", plain, arrays)
-
-
 def test_runners_can_be_handed_in():
     """For trials that are watched, for instance."""
 
@@ -159,3 +148,21 @@ def test_runners_can_be_handed_in():
         trials.look("drumming", XY, 3), {"drumming": Watched()}
     )
     assert found == results.GazeResult(True, [0.25, 3.0], 1.5)
+
+
+def test_positions_fill_the_region_and_depend_on_the_seed():
+    scenario = load_scenario("drumming")
+    region = scenario.drum_region
+    low = np.array([region.x[0], region.y[0]])
+    high = np.array([region.x[1], region.y[1]])
+    for count in (1, 5, 12):
+        first = trials.draw_positions(scenario, count, np.random.default_rng(1))
+        assert first.shape == (count, 2)
+        assert np.all((first >= low) & (first <= high))
+        again = trials.draw_positions(scenario, count, np.random.default_rng(1))
+        np.testing.assert_array_equal(first, again)
+        other = trials.draw_positions(scenario, count, np.random.default_rng(2))
+        assert not np.array_equal(first, other)
+    # Spread: each quarter of the region has some of 12.
+    cells = ((first - low) / (high - low) > 0.5) @ [1, 2]
+    assert set(cells.tolist()) == {0, 1, 2, 3}

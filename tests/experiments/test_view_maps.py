@@ -3,32 +3,19 @@
 import numpy as np
 import pytest
 
-from drake_affetto.experiments.view_maps import (
-    CHANGED_VIEWS,
-    REFERENCE,
-    CalibrationError,
-    ViewDomain,
-    fit_affine,
-    fit_optical,
-    fit_projective,
-    fit_quadratic,
-    learn_from_few,
-    make_optical_map,
-    measure_true_map,
-    measurement_noise,
-    places_of,
-    with_error,
-)
+from drake_affetto.experiments import view_maps
 
 
 @pytest.fixture(scope="module")
 def reference():
-    return ViewDomain.of(REFERENCE)
+    return view_maps.ViewDomain.of(view_maps.REFERENCE)
 
 
 @pytest.fixture(scope="module")
 def mirror(reference):
-    return measure_true_map(ViewDomain.of("mirror"), reference, n=6)
+    return view_maps.measure_true_map(
+        view_maps.ViewDomain.of("mirror"), reference, n=6
+    )
 
 
 def some(n=30, seed=0):
@@ -49,9 +36,21 @@ def test_each_fit_finds_a_map_of_its_kind():
         return affine(X) + np.stack([X[:, 0] ** 2, X[:, 0] * X[:, 1]], -1)
 
     for true, fits, others in (
-        (affine, (fit_affine, fit_projective, fit_quadratic), ()),
-        (projective, (fit_projective,), (fit_affine,)),
-        (quadratic, (fit_quadratic,), (fit_affine, fit_projective)),
+        (
+            affine,
+            (
+                view_maps.fit_affine,
+                view_maps.fit_projective,
+                view_maps.fit_quadratic,
+            ),
+            (),
+        ),
+        (projective, (view_maps.fit_projective,), (view_maps.fit_affine,)),
+        (
+            quadratic,
+            (view_maps.fit_quadratic,),
+            (view_maps.fit_affine, view_maps.fit_projective),
+        ),
     ):
         for fit in fits:
             predicted = fit(X, true(X)).predict(Z)
@@ -61,10 +60,10 @@ def test_each_fit_finds_a_map_of_its_kind():
             assert np.abs(predicted - true(Z)).max() > 0.01
 
 
-@pytest.mark.parametrize("name", CHANGED_VIEWS)
+@pytest.mark.parametrize("name", view_maps.CHANGED_VIEWS)
 def test_each_changed_view_sees_all_of_its_region(name, reference):
-    view = ViewDomain.of(name)
-    true = measure_true_map(view, reference, n=3)
+    view = view_maps.ViewDomain.of(name)
+    true = view_maps.measure_true_map(view, reference, n=3)
     assert len(true.target) == 9
     corners = view.sight.positions[[0, 8, 40, 72, 80]]
     # Rendered and geometric pixels agree: nothing hides the marker.
@@ -72,7 +71,9 @@ def test_each_changed_view_sees_all_of_its_region(name, reference):
 
 
 def test_a_moved_robot_changes_nothing_as_its_camera_moves_along(reference):
-    true = measure_true_map(ViewDomain.of("robot_moved"), reference, n=4)
+    true = view_maps.measure_true_map(
+        view_maps.ViewDomain.of("robot_moved"), reference, n=4
+    )
     np.testing.assert_allclose(true.target, true.source, atol=1e-6)
 
 
@@ -80,26 +81,31 @@ def test_places_are_those_of_the_drum(reference):
     xy = reference.sight.positions[::7]
     tau = reference.task_parameters(xy)
     # The centroid is not quite the center: a millimeter.
-    np.testing.assert_allclose(places_of(reference, tau), xy, atol=3e-3)
+    np.testing.assert_allclose(
+        view_maps.places_of(reference, tau), xy, atol=3e-3
+    )
 
 
 def test_the_optical_map_explains_the_mirror_and_the_affine_does_not(mirror):
-    optical = make_optical_map(mirror.view, mirror.reference)
-    noise = measurement_noise(mirror.reference)
+    optical = view_maps.make_optical_map(mirror.view, mirror.reference)
+    noise = view_maps.measurement_noise(mirror.reference)
     few = [0, 5, 17, 30]
     X, Y = mirror.target[few], mirror.source[few]
-    fit = fit_optical(X, Y, optical, noise)
+    fit = view_maps.fit_optical(X, Y, optical, noise)
     assert mirror.distance(fit.predict(mirror.target)).max() < 0.003
-    affine = fit_affine(mirror.target, mirror.source)
+    affine = view_maps.fit_affine(mirror.target, mirror.source)
     assert mirror.distance(affine.predict(mirror.target)).max() > 0.01
 
 
 def test_more_samples_are_no_worse_and_the_same_seed_gives_the_same(mirror):
-    noise = measurement_noise(mirror.view), measurement_noise(mirror.reference)
+    noise = (
+        view_maps.measurement_noise(mirror.view),
+        view_maps.measurement_noise(mirror.reference),
+    )
     curves = [
-        learn_from_few(
+        view_maps.learn_from_few(
             mirror,
-            lambda X, Y, rng: fit_affine(X, Y),
+            lambda X, Y, rng: view_maps.fit_affine(X, Y),
             "affine",
             [3, 12],
             15,
@@ -114,8 +120,8 @@ def test_more_samples_are_no_worse_and_the_same_seed_gives_the_same(mirror):
 
 def test_a_wrong_camera_is_wrong_by_as_much_as_is_said(reference):
     model = reference.sight.model
-    error = CalibrationError(focal=0.01, angle=0.02, position=0.005)
-    wrong = with_error(model, error, np.random.default_rng(0))
+    error = view_maps.CalibrationError(focal=0.01, angle=0.02, position=0.005)
+    wrong = view_maps.with_error(model, error, np.random.default_rng(0))
     assert abs(wrong.camera.focal_x / model.camera.focal_x - 1) == (
         pytest.approx(0.01)
     )

@@ -1,15 +1,11 @@
 """The page as a whole: what is on it, and what is not."""
 
-import argparse
 import json
-from pathlib import Path
 import re
 
 import pytest
 
 from drake_affetto import __version__
-from drake_affetto.cli import main as cli
-from drake_affetto.cli import report as command
 from support import report_data
 from support.report_page import Page, make
 
@@ -176,20 +172,3 @@ def test_text_is_not_taken_for_a_template(tmp_path):
     results = report_data.toy()
     results["function"] = "{{ version }} {% raw %}"
     assert "{{ version }} {% raw %}" in make(tmp_path, toy=results).text
-
-
-def test_command(tmp_path, capsys):
-    folder = report_data.write(tmp_path / "toy", report_data.toy())
-    assert cli.main(["report", str(folder)]) == 0
-    assert (folder / "report.html").is_file()
-    assert str(folder / "report.html") in capsys.readouterr().out
-    out = tmp_path / "new" / "page.html"
-    assert cli.main(["report", str(folder), "--out", str(out)]) == 0
-    # The same results, the same page.
-    assert out.read_bytes() == (folder / "report.html").read_bytes()
-    assert cli.main(["report", str(tmp_path)]) == 2
-    assert "has no results.json" in capsys.readouterr().err
-    assert cli.main(["report"]) == 2
-    parser = argparse.ArgumentParser()
-    command.add_arguments(parser)
-    assert parser.parse_args(["a", "b"]).folders == [Path("a"), Path("b")]

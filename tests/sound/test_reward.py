@@ -1,6 +1,5 @@
 """Eqs. 9 and 10 against their plain reading; what counts as a hit."""
 
-import dataclasses
 import time
 
 from hypothesis import given
@@ -10,7 +9,6 @@ import numpy as np
 import pytest
 
 from drake_affetto.common.errors import InputError
-from drake_affetto.sound import config as sound_config
 from drake_affetto.sound.reward import (
     RewardConfig,
     cut_prototype,
@@ -23,7 +21,6 @@ from drake_affetto.sound.reward import (
 )
 from drake_affetto.sound.separation import (
     HITS,
-    KINDS,
     made_up_trial,
     made_up_trials,
     separation,
@@ -224,6 +221,26 @@ def test_taps_are_alike_and_repeatable():
         assert reward(spectrogram(recording, voice.rate), taps) > 0.5
 
 
+def test_reward_over_time_peaks_at_the_reward():
+    rng = np.random.default_rng(5)
+    trial = rng.random((6, 40))
+    prototypes = [rng.random((6, 9)) for _ in range(3)]
+    prototypes.append(trial[:, 13:22] + 1e-3 * rng.random((6, 9)))
+    course = reward_over_time(trial, prototypes)
+    assert course.shape == (40 - 9 + 1,)
+    assert np.argmax(course) == 13
+    assert course.max() == pytest.approx(reward(trial, prototypes), abs=1e-6)
+    # Each place alone, by the definition.
+    for o in (0, 7, 31):
+        by_hand = max(
+            1.0 - np.linalg.norm(trial[:, o : o + 9] - p) / np.linalg.norm(p)
+            for p in prototypes
+        )
+        assert course[o] == pytest.approx(by_hand, abs=1e-9)
+    with pytest.raises(InputError, match="one shape"):
+        reward_over_time(trial, [prototypes[0], prototypes[1][:, :5]])
+
+
 def test_reward_separates_hits_from_everything_else():
     voice = DrumVoice()
     rng = np.random.default_rng(0)
@@ -248,82 +265,3 @@ def test_reward_separates_hits_from_everything_else():
         # Without a press that is not quite gentle, nothing comes near.
         assert rewards[~np.array(hits) & ~pressed].max() < 0.15
         assert np.mean(rewards[pressed] > 0.15) < 0.25
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_made_up_trials_are_what_they_say(kind):
-    voice = DrumVoice()
-    trial = made_up_trial(kind, voice, np.random.default_rng(1), duration=2.5)
-    again = made_up_trial(kind, voice, np.random.default_rng(1), duration=2.5)
-    assert np.array_equal(trial.pressure, again.pressure)
-    assert (trial.impulse > 0.0) == (kind in (*HITS, "slow press"))
-    if kind in HITS:
-        assert trial.rate_of_force > 10.0
-    with pytest.raises(InputError, match="kind"):
-        made_up_trial(kind + "?", voice, np.random.default_rng(1))
-
-
-def test_separation_counts():
-    result = separation([0.9, 0.16, 0.1, 0.15, 0.2, -1.0], [1, 1, 1, 0, 0, 0])
-    assert (result.false_hits, result.missed_hits) == (1, 1)
-    assert (result.hits, result.others) == (3, 3)
-    # Pairs in the right order, by hand: 3 + 2 + 1 of 9.
-    assert result.auc == pytest.approx(6.0 / 9.0)
-    assert separation([0.3, 0.3], [True, False]).auc == 0.5
-    assert np.isnan(separation([0.3], [True]).auc)
-    with pytest.raises(InputError, match="hits"):
-        separation([0.3], [True, False])
-
-
-def test_the_file_of_settings_holds_them_all():
-    config = sound_config.load_sound_config()
-    assert config == sound_config.SoundConfig()
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("reward: {bands: 0}", "reward.bands"),
-        ("reward: {hop: 1.0}", "reward.hop"),
-        ("reward: {high: 10.0}", "reward.high"),
-        ("reward: {treshold: 0.2}", "treshold"),
-        ("voice: {membrane: {radius: wide}}", "radius"),
-        ("voice: {microphone_distance: -1.0}", "microphone_distance"),
-        ("[1, 2]", "mapping"),
-    ],
-)
-def test_settings_that_do_not_fit(tmp_path, text, message):
-    path = tmp_path / "sound.yaml"
-    path.write_text(text)
-    with pytest.raises(InputError, match=message):
-        sound_config.load_sound_config(str(path))
-
-
-def test_a_part_of_the_settings_leaves_the_rest(tmp_path):
-    path = tmp_path / "sound.yaml"
-    path.write_text("voice: {membrane: {tension: 150.0}}")
-    config = sound_config.load_sound_config(str(path))
-    expected = sound_config.SoundConfig()
-    expected.voice.membrane.tension = 150.0
-    assert config == expected
-    assert dataclasses.replace(config.reward) == RewardConfig()
-
-
-def test_reward_over_time_peaks_at_the_reward():
-    rng = np.random.default_rng(5)
-    trial = rng.random((6, 40))
-    prototypes = [rng.random((6, 9)) for _ in range(3)]
-    prototypes.append(trial[:, 13:22] + 1e-3 * rng.random((6, 9)))
-    course = reward_over_time(trial, prototypes)
-    assert course.shape == (40 - 9 + 1,)
-    assert np.argmax(course) == 13
-    assert course.max() == pytest.approx(reward(trial, prototypes), abs=1e-6)
-    # Each place alone, by the definition.
-    for o in (0, 7, 31):
-        by_hand = max(
-            1.0 - np.linalg.norm(trial[:, o : o + 9] - p) / np.linalg.norm(p)
-            for p in prototypes
-        )
-        assert course[o] == pytest.approx(by_hand, abs=1e-9)
-    with pytest.raises(InputError, match="one shape"):
-        reward_over_time(trial, [prototypes[0], prototypes[1][:, :5]])

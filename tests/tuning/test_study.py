@@ -311,32 +311,6 @@ def test_another_study_is_not_mixed_in(finished, short, capsys):
     assert len(by_candidate(out)) == TRIALS
 
 
-@pytest.mark.parametrize(
-    ("options", "word"),
-    [
-        (["--trials", "0"], "--trials"),
-        (["--workers", "-1"], "--workers"),
-        (["--seed", "-1"], "--seed"),
-        (["--joints", "elbow"], "--joints"),
-        (["--joints", "waist_yaw", "waist_yaw"], "--joints"),
-        # A joint of the robot, but locked in this scenario.
-        (["--joints", "left_elbow_flexion"], "--joints"),
-        (["--scenario", "drumning"], "drumming"),
-        (["--start", "no_such.yaml"], "no_such.yaml"),
-        (["--tuning", "no_such.yaml"], "no_such.yaml"),
-    ],
-)
-def test_bad_options_are_told_before_anything_runs(
-    options, word, tmp_path, capsys
-):
-    out = tmp_path / "out"
-    assert main(["tune", *options, "--out", str(out)]) == 2
-    error = capsys.readouterr().err
-    assert word in error
-    assert len(error.strip().splitlines()) == 1
-    assert not out.exists()
-
-
 def test_a_folder_with_something_else_in_it_is_told(tmp_path, short, capsys):
     (tmp_path / "study.sqlite").write_text("this is no database at all" * 99)
     status = main(

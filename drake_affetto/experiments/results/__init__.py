@@ -1,15 +1,13 @@
 """Results of trials and studies, one dataclass a kind.
 
 The same dataclasses are written to the store and to results.json, and read
-from there: `pack` and `unpack` for trials, `to_plain` and `from_plain` of
-`drake_affetto.common.typed_json` for studies. The order of the fields is that
-of the JSON.
+from there: `pack` and `unpack` of `trial` for trials, `to_plain` and
+`from_plain` of `drake_affetto.common.typed_json` for studies. The order of the
+fields is that of the JSON.
 """
 
 from drake_affetto.experiments.results.demo import (
-    DemoDrumming,
     DemoMirror,
-    DemoPosition,
     DemoResults,
     DemoScheme,
     DemoTaught,
@@ -38,34 +36,29 @@ from drake_affetto.experiments.results.mirror import (
 from drake_affetto.experiments.results.rates import SuccessRate
 from drake_affetto.experiments.results.study import STUDY_RESULTS, read_study
 from drake_affetto.experiments.results.toy import (
+    PAPER,
+    SourceErrors,
     ToyFigures,
     ToyMethod,
     ToyPaper,
-    ToyPaperSource,
-    ToyPaperTransfer,
     ToyResults,
     ToySource,
+    TransferErrors,
 )
 from drake_affetto.experiments.results.trial import (
-    TRIAL_RESULTS,
     DemonstrationResult,
     DrummingResult,
     GazeResult,
     StrikeResult,
-    TrialResult,
-    pack,
-    unpack,
 )
 
 __all__ = [
+    "PAPER",
     "STUDY_RESULTS",
-    "TRIAL_RESULTS",
     "ConditionRow",
     "ConditionsResults",
     "CurvePoint",
-    "DemoDrumming",
     "DemoMirror",
-    "DemoPosition",
     "DemoResults",
     "DemoScheme",
     "DemoTaught",
@@ -84,19 +77,16 @@ __all__ = [
     "SchemeCell",
     "SchemeComparisonRow",
     "SimilarityTraces",
+    "SourceErrors",
     "StrikeResult",
     "SuccessRate",
     "TaughtPosition",
     "ToyFigures",
     "ToyMethod",
     "ToyPaper",
-    "ToyPaperSource",
-    "ToyPaperTransfer",
     "ToyResults",
     "ToySource",
+    "TransferErrors",
     "TransferMap",
-    "TrialResult",
-    "pack",
     "read_study",
-    "unpack",
 ]

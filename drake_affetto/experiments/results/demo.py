@@ -2,7 +2,9 @@
 
 import dataclasses
 from dataclasses import field
+from typing import ClassVar
 
+from drake_affetto.common.study_results import StudyResults
 from drake_affetto.experiments.results.rates import PROBABILITY, Position
 
 
@@ -103,22 +105,15 @@ class DemoMirror:
 
 
 @dataclasses.dataclass(frozen=True)
-class DemoResults:
+class DemoResults(StudyResults):
     """results.json of `affetto demo`.
 
     Attributes:
-        study: Kind of study, "demo".
-        version: Version of the package that ran it.
-        seed: Seed of everything that is random.
         drumming: Part in direct view.
         mirror: Part before the mirror.
     """
 
-    study: str
-    version: str
-    seed: int
+    KIND: ClassVar[str] = "demo"
+
     drumming: DemoDrumming
     mirror: DemoMirror
-
-    def check(self, where: str) -> None:
-        """All parts fit each other."""

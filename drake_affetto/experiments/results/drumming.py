@@ -2,8 +2,10 @@
 
 import dataclasses
 from dataclasses import field
+from typing import ClassVar
 
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.study_results import StudyResults
 from drake_affetto.experiments.results.rates import (
     NOT_EMPTY,
     PROBABILITY,
@@ -13,21 +15,30 @@ from drake_affetto.experiments.results.rates import (
 
 
 @dataclasses.dataclass(frozen=True)
-class TaughtPosition:
-    """A position of the drum at which a demonstration was given.
+class _Seen:
+    """A position of the drum that the robot has looked at in one repeat.
 
     Attributes:
         repeat: Number of the study's repeat.
         xy: Position of the drum, m.
         tau: Task parameter τ (2,).
-        attempts: Number of times that the movement was demonstrated.
-        reward: Reward of the best replay.
-        max_pull: Greatest force of the teacher, N.
     """
 
     repeat: int
     xy: Position
     tau: list[float]
+
+
+@dataclasses.dataclass(frozen=True)
+class TaughtPosition(_Seen):
+    """A position of the drum at which a demonstration was given.
+
+    Attributes:
+        attempts: Number of times that the movement was demonstrated.
+        reward: Reward of the best replay.
+        max_pull: Greatest force of the teacher, N.
+    """
+
     attempts: int
     reward: float
     max_pull: float | None
@@ -62,21 +73,15 @@ class LearningCurve:
 
 
 @dataclasses.dataclass(frozen=True)
-class EvaluatedPosition:
+class EvaluatedPosition(_Seen):
     """A trial at a test position.
 
     Attributes:
-        repeat: Number of the study's repeat.
-        xy: Position of the drum, m.
-        tau: Task parameter τ (2,).
         reward: Reward from the sound.
         success: Whether the reward is above the threshold.
         contact_impulse: Impulse on the drum's head, N s.
     """
 
-    repeat: int
-    xy: Position
-    tau: list[float]
     reward: float
     success: bool
     contact_impulse: float | None
@@ -160,13 +165,10 @@ class SimilarityTraces:
 
 
 @dataclasses.dataclass(frozen=True)
-class DrumResults:
+class DrumResults(StudyResults):
     """results.json of `affetto drum`.
 
     Attributes:
-        study: Kind of study, "drum".
-        version: Version of the package that ran it.
-        seed: Seed of everything that is random.
         scenario: Scenario, by name or path.
         demonstrations: Number of demonstrations of a repeat.
         evaluations: Number of test positions.
@@ -182,9 +184,8 @@ class DrumResults:
         similarity: Examples of Fig. 3b; None without both a hit and a miss.
     """
 
-    study: str
-    version: str
-    seed: int
+    KIND: ClassVar[str] = "drum"
+
     scenario: str
     demonstrations: int
     evaluations: int

@@ -2,10 +2,12 @@
 
 import dataclasses
 from dataclasses import field
+from typing import ClassVar
 
 import numpy as np
 
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.study_results import StudyResults
 from drake_affetto.experiments.results.rates import (
     NOT_EMPTY,
     Position,
@@ -97,13 +99,10 @@ class TransferMap:
 
 
 @dataclasses.dataclass(frozen=True)
-class MirrorResults:
+class MirrorResults(StudyResults):
     """results.json of `affetto mirror`, for one changed view.
 
     Attributes:
-        study: Kind of study, "mirror".
-        version: Version of the package that ran it.
-        seed: Seed of everything that is random.
         scenario: Scenario of the changed view, by name or path.
         samples: Numbers of demonstrations that the schemes were given.
         repeats: Number of repeats.
@@ -117,9 +116,8 @@ class MirrorResults:
         map: The map of the first repeat; None if no scheme found one.
     """
 
-    study: str
-    version: str
-    seed: int
+    KIND: ClassVar[str] = "mirror"
+
     scenario: str
     samples: list[int] = field(metadata=NOT_EMPTY)
     repeats: int
@@ -146,19 +144,15 @@ class MirrorResults:
 
 
 @dataclasses.dataclass(frozen=True)
-class ScenariosResults:
+class ScenariosResults(StudyResults):
     """results.json of `affetto mirror --all-scenarios`.
 
     Attributes:
-        study: Kind of study, "scenarios".
-        version: Version of the package that ran it.
-        seed: Seed of everything that is random.
         scenarios: Results by changed view.
     """
 
-    study: str
-    version: str
-    seed: int
+    KIND: ClassVar[str] = "scenarios"
+
     scenarios: dict[str, MirrorResults] = field(metadata=NOT_EMPTY)
 
     def check(self, where: str) -> None:
@@ -189,26 +183,19 @@ class ConditionRow:
 
 
 @dataclasses.dataclass(frozen=True)
-class ConditionsResults:
+class ConditionsResults(StudyResults):
     """results.json of the study on when transfer wins.
 
     Attributes:
-        study: Kind of study, "conditions".
-        version: Version of the package that ran it.
-        seed: Seed of everything that is random.
         scenario: Scenario of the changed view.
         repeats: Number of repeats.
         evaluations: Number of test positions of a repeat.
         conditions: Success by condition, scheme and number of samples.
     """
 
-    study: str
-    version: str
-    seed: int
+    KIND: ClassVar[str] = "conditions"
+
     scenario: str
     repeats: int
     evaluations: int
     conditions: list[ConditionRow] = field(metadata=NOT_EMPTY)
-
-    def check(self, where: str) -> None:
-        """All parts fit each other."""

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from drake_affetto.common.study_results import StudyResults
 from drake_affetto.common.typed_json import from_plain
 from drake_affetto.experiments.results.demo import DemoResults
 from drake_affetto.experiments.results.drumming import DrumResults
@@ -12,13 +13,16 @@ from drake_affetto.experiments.results.mirror import (
 )
 from drake_affetto.experiments.results.toy import ToyResults
 
-STUDY_RESULTS: dict[str, Any] = {
-    "demo": DemoResults,
-    "drum": DrumResults,
-    "mirror": MirrorResults,
-    "scenarios": ScenariosResults,
-    "conditions": ConditionsResults,
-    "toy": ToyResults,
+STUDY_RESULTS: dict[str, type[StudyResults]] = {
+    each.KIND: each
+    for each in (
+        DemoResults,
+        DrumResults,
+        MirrorResults,
+        ScenariosResults,
+        ConditionsResults,
+        ToyResults,
+    )
 }
 
 

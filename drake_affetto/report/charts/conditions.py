@@ -3,28 +3,14 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import plotly.graph_objects as go
-
 from drake_affetto.experiments.results import (
     ConditionRow,
 )
-from drake_affetto.report import wording
+from drake_affetto.report import style, wording
 from drake_affetto.report.comparison import SchemeComparison
-from drake_affetto.report.style import (
-    LIGHT,
-    Chart,
-    difference_map,
-    escaped,
-    make_figure,
-    percent_axis,
-    scheme_color,
-    scheme_marker,
-    signed,
-    whiskers,
-)
 
 
-def scenario_dots(comparisons: Mapping[str, SchemeComparison]) -> Chart:
+def scenario_dots(comparisons: Mapping[str, SchemeComparison]) -> style.Chart:
     """Success by changed view, a symbol for each scheme."""
     names = wording.ordered(
         {name for each in comparisons.values() for name in each.rates}
@@ -43,31 +29,26 @@ def scenario_dots(comparisons: Mapping[str, SchemeComparison]) -> Chart:
             if name in comparisons[view].rates
         ]
         traces.append(
-            go.Scatter(
+            style.scheme_points(
+                name,
+                "%{customdata}: %{x:.0f} %",
                 x=[100 * r.mean for _, _, r in here],
                 y=[i + shift for i, _, _ in here],
-                error_x=whiskers([r for _, _, r in here]) | {"width": 0},
-                name=escaped(wording.scheme(name)),
-                mode="markers",
-                marker=scheme_marker(name),
-                customdata=[escaped(wording.scenario(v)) for _, v, _ in here],
-                hovertemplate="%{customdata}: %{x:.0f} %<extra>"
-                + escaped(wording.scheme(name))
-                + "</extra>",
+                error_x=style.whiskers([r for _, _, r in here]) | {"width": 0},
+                customdata=[
+                    style.escaped(wording.scenario(v)) for _, v, _ in here
+                ],
             )
         )
-    figure = make_figure(
+    figure = style.make_figure(
         traces,
-        x=percent_axis("success at unseen positions"),
-        y={
-            "tickvals": list(range(len(views))),
-            "ticktext": [
-                escaped(wording.scenario(v)).replace(" and ", " and<br>")
+        x=style.percent_axis("success at unseen positions"),
+        y=style.places_axis(
+            [
+                style.escaped(wording.scenario(v)).replace(" and ", " and<br>")
                 for v in views
-            ],
-            "range": [len(views) - 0.5, -0.5],
-            "showgrid": False,
-        },
+            ]
+        ),
         shapes=[
             {
                 "type": "line",
@@ -76,12 +57,12 @@ def scenario_dots(comparisons: Mapping[str, SchemeComparison]) -> Chart:
                 "x1": 1,
                 "y0": i + 0.5,
                 "y1": i + 0.5,
-                "line": {"color": LIGHT["grid"], "width": 1},
+                "line": {"color": style.LIGHT["grid"], "width": 1},
             }
             for i in range(len(views) - 1)
         ],
     )
-    return Chart(
+    return style.Chart(
         "scenarios",
         "Seven ways of seeing otherwise"
         if len(views) == 7
@@ -108,14 +89,14 @@ def scenario_dots(comparisons: Mapping[str, SchemeComparison]) -> Chart:
     )
 
 
-def condition_charts(conditions: Sequence[ConditionRow]) -> list[Chart]:
+def condition_charts(conditions: Sequence[ConditionRow]) -> list[style.Chart]:
     """Success of the schemes over what was varied, a chart for each factor.
 
     Over the factor's values where each was run with one number of samples, or
     with the commonest of them; and over the number of samples for each value
     that was run with several.
     """
-    charts: list[Chart] = []
+    charts: list[style.Chart] = []
     factors = list(dict.fromkeys(row.factor for row in conditions))
     for factor in factors:
         rows = [row for row in conditions if row.factor == factor]
@@ -176,38 +157,37 @@ def _condition_chart(
     caption: str,
     axis: str,
     points: list[tuple[Any, ConditionRow]],
-) -> Chart:
+) -> style.Chart:
     names = wording.ordered({row.scheme for _, row in points})
-    ticks = list(dict.fromkeys(escaped(place) for place, _ in points))
+    ticks = list(dict.fromkeys(style.escaped(place) for place, _ in points))
     traces = []
     for name in names:
-        own = [(escaped(x), row) for x, row in points if row.scheme == name]
+        own = [
+            (style.escaped(x), row) for x, row in points if row.scheme == name
+        ]
         found = [row.success_rate for _, row in own]
         traces.append(
-            go.Scatter(
+            style.scheme_points(
+                name,
+                "%{y:.0f} %",
                 x=[ticks.index(x) for x, _ in own],
                 y=[100 * r.mean for r in found],
-                error_y=whiskers(found),
-                name=escaped(wording.scheme(name)),
+                error_y=style.whiskers(found),
                 mode="lines+markers",
-                line={"color": scheme_color(name), "width": 2},
-                marker=scheme_marker(name),
-                hovertemplate="%{y:.0f} %<extra>"
-                + escaped(wording.scheme(name))
-                + "</extra>",
+                line={"color": style.scheme_color(name), "width": 2},
             )
         )
-    figure = make_figure(
+    figure = style.make_figure(
         traces,
         x={
-            "title": {"text": escaped(axis)},
+            "title": {"text": style.escaped(axis)},
             "tickvals": list(range(len(ticks))),
             "ticktext": ticks,
             "range": [-0.25, len(ticks) - 0.75],
         },
-        y=percent_axis(),
+        y=style.percent_axis(),
     )
-    return Chart(
+    return style.Chart(
         key,
         title,
         caption,
@@ -231,7 +211,7 @@ def _condition_chart(
 
 def advantage(
     conditions: Sequence[ConditionRow], ours: str, rival: str
-) -> Chart | None:
+) -> style.Chart | None:
     """By how much one scheme beats another, over conditions and samples."""
     means = {
         (row.factor, row.value, row.samples, row.scheme): row.success_rate.mean
@@ -261,14 +241,20 @@ def advantage(
             )
     if not rows:
         return None
-    figure = make_figure(
+    figure = style.make_figure(
         [
-            difference_map(
+            style.difference_map(
                 z,
                 [str(n) for n in samples],
-                [f"{escaped(factor)}:<br>{escaped(v)}" for factor, v in places],
-                [["" if v is None else signed(v) for v in row] for row in z],
-                textfont={"color": LIGHT["ink"]},
+                [
+                    f"{style.escaped(factor)}:<br>{style.escaped(v)}"
+                    for factor, v in places
+                ],
+                [
+                    ["" if v is None else style.signed(v) for v in row]
+                    for row in z
+                ],
+                textfont={"color": style.LIGHT["ink"]},
                 hovertemplate="%{y}, %{x} demonstrations: %{z:+.0f} points"
                 "<extra></extra>",
             )
@@ -281,7 +267,7 @@ def advantage(
         y={"autorange": "reversed", "showgrid": False},
     )
     ahead = sum(v is not None and v > 0.5 for row in z for v in row)
-    return Chart(
+    return style.Chart(
         f"advantage-{ours.replace('_', '-')}",
         f"{wording.scheme(ours, full=True)}, minus relearning"
         if rival == "relearn"

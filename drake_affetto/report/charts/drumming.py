@@ -11,15 +11,7 @@ from drake_affetto.experiments.results import (
     CurvePoint,
     RewardRow,
 )
-from drake_affetto.report import wording
-from drake_affetto.report.style import (
-    LIGHT,
-    Chart,
-    make_figure,
-    percent_axis,
-    reference_line,
-    with_lines,
-)
+from drake_affetto.report import style, wording
 
 
 class PositionRow(Protocol):
@@ -52,7 +44,7 @@ def learning_curve(
     *,
     evaluations: int,
     repeats: int,
-) -> Chart:
+) -> style.Chart:
     """Fig. 3c: success over the number of demonstrations, with a band."""
     curves = [("random", "positions in random order", "solid", random)]
     if active:
@@ -73,22 +65,30 @@ def learning_curve(
             y=[100],
             name="paper: 10 of 10 after 25",
             mode="markers",
-            marker={"symbol": "star", "size": 15, "color": LIGHT["paper"]},
+            marker={
+                "symbol": "star",
+                "size": 15,
+                "color": style.LIGHT["paper"],
+            },
             hovertemplate="paper: 10 of 10 after 25<extra></extra>",
         )
     )
     last = max(25, *(point.n for point in random))
-    figure = make_figure(
+    figure = style.make_figure(
         traces,
         x={
             "title": {"text": "demonstrations"},
             "range": [0, last + 1],
             "dtick": 5,
         },
-        y=percent_axis("success at unseen positions"),
-        **with_lines(
-            reference_line(
-                90, "90 %", LIGHT["muted"], vertical=False, position="start"
+        y=style.percent_axis("success at unseen positions"),
+        **style.with_lines(
+            style.reference_line(
+                90,
+                "90 %",
+                style.LIGHT["muted"],
+                vertical=False,
+                position="start",
             )
         ),
     )
@@ -109,7 +109,7 @@ def learning_curve(
             else ""
         )
     )
-    return Chart(
+    return style.Chart(
         "learning-curve",
         "How many demonstrations does it take?",
         caption.strip(),
@@ -138,7 +138,7 @@ def _curve(
         x=n + n[::-1],
         y=high + low[::-1],
         fill="toself",
-        fillcolor=LIGHT[key],
+        fillcolor=style.LIGHT[key],
         mode="none",
         opacity=0.18,
         hoverinfo="skip",
@@ -152,7 +152,7 @@ def _curve(
         name=label,
         legendgroup=key,
         mode="lines+markers",
-        line={"color": LIGHT[key], "width": 2.5, "dash": dash},
+        line={"color": style.LIGHT[key], "width": 2.5, "dash": dash},
         marker={
             "size": 6,
             "symbol": "circle" if key == "random" else "diamond",
@@ -168,17 +168,17 @@ def _curve(
 
 def similarity(
     t: list[float], hit: list[float], miss: list[float], threshold: float
-) -> Chart:
+) -> style.Chart:
     """Fig. 3b: the similarity at each offset, for a hit and for a miss."""
     curves = [("hit", "a hit", "solid", hit), ("miss", "a miss", "dash", miss)]
-    figure = make_figure(
+    figure = style.make_figure(
         [
             go.Scatter(
                 x=t,
                 y=values,
                 name=label,
                 mode="lines",
-                line={"color": LIGHT[key], "width": 2, "dash": dash},
+                line={"color": style.LIGHT[key], "width": 2, "dash": dash},
                 hovertemplate="%{x:.2f} s: %{y:.2f}<extra>"
                 + label
                 + "</extra>",
@@ -187,18 +187,10 @@ def similarity(
         ],
         x={"title": {"text": "offset in the recording [s]"}},
         y={"title": {"text": "similarity R"}},
-        **with_lines(
-            reference_line(
-                threshold,
-                f"R = {threshold:g}",
-                LIGHT["muted"],
-                vertical=False,
-                position="start",
-            )
-        ),
+        **style.threshold_line(threshold, vertical=False),
     )
     step = max(1, math.ceil(len(t) / 150))
-    return Chart(
+    return style.Chart(
         "similarity",
         "What counts as a drum",
         "Fig. 3b. The recording is compared with the sounds heard while "
@@ -221,7 +213,7 @@ def workspace(
     taught: Sequence[PositionRow],
     tests: Sequence[TestedRow],
     threshold: float,
-) -> Chart:
+) -> style.Chart:
     """Where was taught and tested, seen from above as the robot sees it."""
     return _taught_and_tested(
         taught,
@@ -252,7 +244,7 @@ def task_space(
     taught: Sequence[PositionRow],
     tests: Sequence[TestedRow],
     threshold: float,
-) -> Chart | None:
+) -> style.Chart | None:
     """The same places as the skill has them; None if they are not two numbers.
 
     Rows whose `tau` is [y_img, q3* in rad].
@@ -291,7 +283,7 @@ def _taught_and_tested(
     caption: str,
     x: dict[str, Any],
     y: dict[str, Any],
-) -> Chart:
+) -> style.Chart:
     def points(rows: Sequence[PositionRow]) -> dict[str, list[float]]:
         return {
             "x": [place(row)[0] for row in rows],
@@ -307,8 +299,8 @@ def _taught_and_tested(
             marker={
                 "symbol": "cross-thin-open",
                 "size": 9,
-                "color": LIGHT["muted"],
-                "line": {"width": 1.5, "color": LIGHT["muted"]},
+                "color": style.LIGHT["muted"],
+                "line": {"width": 1.5, "color": style.LIGHT["muted"]},
             },
             opacity=1.0 if len(taught) < 60 else 0.5,
             hovertemplate=f"taught at {where}<extra></extra>",
@@ -318,7 +310,7 @@ def _taught_and_tested(
         rows = [row for row in tests if row.success is success]
         if rows:
             traces += _tested(points(rows), rows, success, where)
-    figure = make_figure(
+    figure = style.make_figure(
         traces,
         x=x,
         y=y,
@@ -326,9 +318,9 @@ def _taught_and_tested(
             "cmin": 0,
             "cmax": 1,
             "colorscale": [
-                [0, LIGHT["low_reward"]],
-                [0.5, LIGHT["mid_reward"]],
-                [1, LIGHT["high_reward"]],
+                [0, style.LIGHT["low_reward"]],
+                [0.5, style.LIGHT["mid_reward"]],
+                [1, style.LIGHT["high_reward"]],
             ],
             "colorbar": {
                 "title": {"text": "reward", "side": "right"},
@@ -338,7 +330,7 @@ def _taught_and_tested(
         },
     )
     hits = sum(row.success for row in tests)
-    return Chart(
+    return style.Chart(
         key,
         title,
         caption,
@@ -371,7 +363,7 @@ def _tested(
     label, symbol = (
         ("tested: hit", "circle") if success else ("tested: miss", "x")
     )
-    edge = {"width": 1.2, "color": LIGHT["ink"]}
+    edge = {"width": 1.2, "color": style.LIGHT["ink"]}
     rewards = [row.reward for row in rows]
     trials = go.Scatter(
         points,
@@ -398,7 +390,7 @@ def _tested(
         marker={
             "symbol": symbol,
             "size": 11,
-            "color": LIGHT["mid_reward"],
+            "color": style.LIGHT["mid_reward"],
             "line": edge,
         },
     )
@@ -407,7 +399,7 @@ def _tested(
 
 def separation(
     rewards: Sequence[RewardRow], threshold: float, impulse_threshold: float
-) -> Chart:
+) -> style.Chart:
     """Rewards of trials that touched the drum's head and of those that not."""
     groups: dict[str, list[float]] = {"hit": [], "miss": []}
     for row in rewards:
@@ -436,7 +428,7 @@ def separation(
                 name=f"{labels[key]} ({wording.number(len(values), 'trial')})",
                 customdata=counts[key].tolist(),
                 marker={
-                    "color": LIGHT[key],
+                    "color": style.LIGHT[key],
                     "pattern": {"shape": "" if key == "hit" else "/"},
                 },
                 opacity=0.85,
@@ -444,22 +436,19 @@ def separation(
                 "%{y:.1f} %<extra>" + labels[key] + "</extra>",
             )
         )
-    figure = make_figure(
+    figure = style.make_figure(
         traces,
         x={"title": {"text": "reward R"}},
         y={"title": {"text": "share of its group"}, "ticksuffix": " %"},
         barmode="overlay",
-        **with_lines(
-            reference_line(
-                threshold,
-                f"R = {threshold:g}",
-                LIGHT["ink"],
-                vertical=True,
-                position="end",
-            )
+        **style.threshold_line(
+            threshold,
+            vertical=True,
+            color=style.LIGHT["ink"],
+            position="end",
         ),
     )
-    return Chart(
+    return style.Chart(
         "separation",
         "Does the sound tell the truth?",
         "The reward is made from sound alone. Here the simulation says "

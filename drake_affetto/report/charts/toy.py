@@ -10,15 +10,7 @@ from drake_affetto.experiments.results import (
     ToyMethod,
     ToyResults,
 )
-from drake_affetto.report.style import (
-    LIGHT,
-    Chart,
-    escaped,
-    make_figure,
-    reference_line,
-    with_lines,
-    wrapped,
-)
+from drake_affetto.report import style
 
 _Method = tuple[str, str, ToyMethod]
 
@@ -27,7 +19,7 @@ def _seeds(methods: list[_Method]) -> list[Any]:
     """A pale dot for each seed of each method."""
     traces = []
     for i, (group, label, row) in enumerate(methods):
-        color = LIGHT["random" if group == "transfer" else "active"]
+        color = style.LIGHT["random" if group == "transfer" else "active"]
         seeds = [v for v in row.per_seed.get("other_mse_mean", []) if v > 0.0]
         traces.append(
             go.Scatter(
@@ -41,7 +33,9 @@ def _seeds(methods: list[_Method]) -> list[Any]:
                 },
                 opacity=0.35,
                 showlegend=False,
-                hovertemplate="%{x:.3g}<extra>" + escaped(label) + ", a seed"
+                hovertemplate="%{x:.3g}<extra>"
+                + style.escaped(label)
+                + ", a seed"
                 "</extra>",
             )
         )
@@ -69,10 +63,10 @@ def _medians(methods: list[_Method]) -> list[Any]:
                 marker={
                     "symbol": symbol,
                     "size": 12,
-                    "color": LIGHT[color],
-                    "line": {"color": LIGHT["ink"], "width": 1.5},
+                    "color": style.LIGHT[color],
+                    "line": {"color": style.LIGHT["ink"], "width": 1.5},
                 },
-                customdata=[escaped(label) for _, _, label in own],
+                customdata=[style.escaped(label) for _, _, label in own],
                 hovertemplate="%{customdata}: median %{x:.3g}<extra></extra>",
             )
         )
@@ -86,7 +80,7 @@ def toy_errors(
     key: str,
     square: str,
     paper: float | None,
-) -> Chart:
+) -> style.Chart:
     """Fig. 2: errors on the points not given, by method; a dot for a seed.
 
     Args:
@@ -105,10 +99,10 @@ def toy_errors(
     traces = [*_seeds(methods), *_medians(methods)]
     lines = (
         [
-            reference_line(
+            style.reference_line(
                 math.log10(paper),
                 f"paper: {paper:g}",
-                LIGHT["paper"],
+                style.LIGHT["paper"],
                 vertical=True,
                 position="start",
             )
@@ -119,7 +113,7 @@ def toy_errors(
     for line in lines:
         # On a logarithmic axis a shape's place is the value itself.
         line["shape"].update(x0=paper, x1=paper)
-    figure = make_figure(
+    figure = style.make_figure(
         traces,
         x={
             "title": {"text": "mean squared error"},
@@ -129,14 +123,14 @@ def toy_errors(
         },
         y={
             "tickvals": list(range(len(methods))),
-            "ticktext": [wrapped(label) for _, label, _ in methods],
+            "ticktext": [style.wrapped(label) for _, label, _ in methods],
             "range": [len(methods) - 0.1, -0.5],
             "tickfont": {"size": 12},
         },
-        **with_lines(*lines),
+        **style.with_lines(*lines),
     )
     _, best, least = min(methods, key=lambda m: m[2].other_mse_mean)
-    return Chart(
+    return style.Chart(
         key,
         f"On the square {square}",
         "Fig. 2. Errors on the 100 points whose values were not given, after "

@@ -9,27 +9,12 @@ import plotly.graph_objects as go
 from drake_affetto.experiments.results import (
     TransferMap,
 )
-from drake_affetto.report import wording
+from drake_affetto.report import style, wording
 from drake_affetto.report.comparison import Comparison, SchemeComparison
-from drake_affetto.report.style import (
-    LIGHT,
-    Chart,
-    difference_map,
-    escaped,
-    make_figure,
-    percent_axis,
-    reference_line,
-    scheme_color,
-    scheme_marker,
-    signed,
-    whiskers,
-    with_lines,
-    wrapped,
-)
 from drake_affetto.sound.reward import SUCCESS_THRESHOLD
 
 
-def success_by_scheme(comparison: SchemeComparison) -> Chart:
+def success_by_scheme(comparison: SchemeComparison) -> style.Chart:
     """Fig. 5a: success by scheme and number of samples, with intervals."""
     names = wording.ordered(comparison.rates)
     rows = [
@@ -40,7 +25,7 @@ def success_by_scheme(comparison: SchemeComparison) -> Chart:
     several = len(comparison.samples) > 1
     traces = _bars(comparison, names)
     if several:
-        figure = make_figure(
+        figure = style.make_figure(
             traces,
             x={
                 "title": {"text": "new demonstrations"},
@@ -48,26 +33,23 @@ def success_by_scheme(comparison: SchemeComparison) -> Chart:
                 "ticktext": [str(n) for n in comparison.samples],
                 "showgrid": False,
             },
-            y=percent_axis("success at unseen positions"),
+            y=style.percent_axis("success at unseen positions"),
         )
     else:
         n = comparison.samples[0]
-        figure = make_figure(
+        figure = style.make_figure(
             traces,
-            x=percent_axis("success at unseen positions"),
-            y={
-                "tickvals": list(range(len(names))),
-                "ticktext": [
-                    f"{escaped(wording.scheme(name))}<br><b>"
+            x=style.percent_axis("success at unseen positions"),
+            y=style.places_axis(
+                [
+                    f"{style.escaped(wording.scheme(name))}<br><b>"
                     f"{wording.percent(comparison.rates[name][n].mean)}</b>"
                     for name in names
-                ],
-                "range": [len(names) - 0.5, -0.5],
-                "showgrid": False,
-            },
+                ]
+            ),
         )
     counts = wording.joined([str(n) for n in comparison.samples])
-    return Chart(
+    return style.Chart(
         "schemes",
         f"Success in the new view ({wording.scenario(comparison.scenario)})",
         f"Fig. 5a. The drum is seen otherwise than it was taught; {counts} new "
@@ -103,14 +85,17 @@ def _bars(comparison: SchemeComparison, names: list[str]) -> list[Any]:
         place = [i + shift for i in range(len(found))] if several else [k]
         mean = [100 * r.mean for r in found]
         along, across = ("x", "y") if several else ("y", "x")
-        error = whiskers(found) | {"color": LIGHT["ink"], "thickness": 1.4}
+        error = style.whiskers(found) | {
+            "color": style.LIGHT["ink"],
+            "thickness": 1.4,
+        }
         # The bar is pale, so that the whisker is seen on it in any theme.
         traces.append(
             go.Bar(
                 {along: place, across: mean},
                 orientation="v" if several else "h",
                 width=0.9 * width if several else 0.62,
-                marker={"color": scheme_color(name)},
+                marker={"color": style.scheme_color(name)},
                 opacity=0.4,
                 hoverinfo="skip",
                 showlegend=False,
@@ -118,24 +103,20 @@ def _bars(comparison: SchemeComparison, names: list[str]) -> list[Any]:
             )
         )
         traces.append(
-            go.Scatter(
-                {along: place, across: mean, f"error_{across}": error},
-                name=escaped(wording.scheme(name)),
-                mode="markers",
-                marker=scheme_marker(name),
+            style.scheme_points(
+                name,
+                f"%{{{across}:.0f}} % (%{{customdata[0]:.0f}} to "
+                "%{customdata[1]:.0f})",
                 customdata=[[100 * r.low, 100 * r.high] for r in found],
-                hovertemplate=f"%{{{across}:.0f}} % (%{{customdata[0]:.0f}} "
-                "to %{customdata[1]:.0f})<extra>"
-                + escaped(wording.scheme(name))
-                + "</extra>",
                 showlegend=several,
                 legendgroup=name,
+                **{along: place, across: mean, f"error_{across}": error},
             )
         )
     return traces
 
 
-def rewards_by_scheme(comparison: SchemeComparison) -> Chart | None:
+def rewards_by_scheme(comparison: SchemeComparison) -> style.Chart | None:
     """Every trial's reward, at the greatest number of samples."""
     n = comparison.samples[-1]
     names = [
@@ -151,17 +132,13 @@ def rewards_by_scheme(comparison: SchemeComparison) -> Chart | None:
         # Spread by rank rather than by chance: the same page each time.
         spread = [0.28 * math.sin(2.4 * i) for i in range(len(values))]
         traces.append(
-            go.Scatter(
+            style.scheme_points(
+                name,
+                "R = %{x:.2f}",
                 x=values,
                 y=[row + s for s in spread],
-                name=escaped(wording.scheme(name)),
-                mode="markers",
-                marker=scheme_marker(name),
                 opacity=0.8,
                 showlegend=False,
-                hovertemplate="R = %{x:.2f}<extra>"
-                + escaped(wording.scheme(name))
-                + "</extra>",
             )
         )
         heard = sum(v > SUCCESS_THRESHOLD for v in values)
@@ -177,7 +154,7 @@ def rewards_by_scheme(comparison: SchemeComparison) -> Chart | None:
         )
     everything = [v for name in names for v in comparison.rewards[name][n]]
     low, high = min(everything), max(everything)
-    figure = make_figure(
+    figure = style.make_figure(
         traces,
         x={
             "title": {"text": "reward R of each trial"},
@@ -186,23 +163,12 @@ def rewards_by_scheme(comparison: SchemeComparison) -> Chart | None:
                 max(high, SUCCESS_THRESHOLD) + 0.05,
             ],
         },
-        y={
-            "tickvals": list(range(len(names))),
-            "ticktext": [escaped(wording.scheme(name)) for name in names],
-            "range": [len(names) - 0.1, -0.5],
-            "showgrid": False,
-        },
-        **with_lines(
-            reference_line(
-                SUCCESS_THRESHOLD,
-                f"R = {SUCCESS_THRESHOLD:g}",
-                LIGHT["muted"],
-                vertical=True,
-                position="start",
-            )
+        y=style.places_axis(
+            [style.escaped(wording.scheme(name)) for name in names], after=0.9
         ),
+        **style.threshold_line(SUCCESS_THRESHOLD, vertical=True),
     )
-    return Chart(
+    return style.Chart(
         "rewards",
         "The sound behind the rates",
         f"Every trial after {wording.number(n, 'demonstration')}, by its "
@@ -216,10 +182,10 @@ def rewards_by_scheme(comparison: SchemeComparison) -> Chart | None:
     )
 
 
-def significance(comparison: SchemeComparison, samples: int) -> Chart:
+def significance(comparison: SchemeComparison, samples: int) -> style.Chart:
     """Fig. 5b: pairwise differences of the rates with their significance."""
     names = wording.ordered(comparison.rates)
-    labels = [wrapped(wording.scheme(name), 10) for name in names]
+    labels = [style.wrapped(wording.scheme(name), 10) for name in names]
     values: list[list[float | None]] = []
     shown: list[list[str]] = []
     hovers: list[list[str]] = []
@@ -237,21 +203,22 @@ def significance(comparison: SchemeComparison, samples: int) -> Chart:
             found = comparison.compare(a, b, samples)
             values[-1].append(round(100 * found.difference, 1))
             shown[-1].append(
-                signed(100 * found.difference) + ("*" if found.clear else "")
+                style.signed(100 * found.difference)
+                + ("*" if found.clear else "")
             )
             pair = f"{wording.scheme(a)} − {wording.scheme(b)}"
             hovers[-1].append(_hover(pair, found))
             if i < j:
                 rows.append(_pair_row(pair, found))
-    figure = make_figure(
+    figure = style.make_figure(
         [
-            difference_map(
+            style.difference_map(
                 values,
                 labels,
                 labels,
                 shown,
                 customdata=hovers,
-                textfont={"size": 11, "color": LIGHT["ink"]},
+                textfont={"size": 11, "color": style.LIGHT["ink"]},
                 hovertemplate="%{customdata}<extra></extra>",
             )
         ],
@@ -259,7 +226,7 @@ def significance(comparison: SchemeComparison, samples: int) -> Chart:
         y={"autorange": "reversed", "showgrid": False},
     )
     clear = [row for row in rows if row[-1] == "yes"]
-    return Chart(
+    return style.Chart(
         f"significance-{samples}",
         f"With {wording.number(samples, 'demonstration')}",
         "Row minus column, in percentage points; a star marks a difference "
@@ -285,7 +252,7 @@ def significance(comparison: SchemeComparison, samples: int) -> Chart:
 def _hover(pair: str, found: Comparison) -> str:
     """What a cell shows when it is touched."""
     text = (
-        f"{escaped(pair)}: {wording.points(found.difference)}"
+        f"{style.escaped(pair)}: {wording.points(found.difference)}"
         f"<br>corrected {wording.p_value(found.p)}"
     )
     if found.effect_size is not None:
@@ -306,7 +273,7 @@ def _pair_row(pair: str, found: Comparison) -> list[str]:
     ]
 
 
-def transfer_map(grid: TransferMap) -> list[Chart]:
+def transfer_map(grid: TransferMap) -> list[style.Chart]:
     """The map h: a grid of what is seen now, and where h puts it."""
     n_rows, n_columns = grid.shape
     charts = []
@@ -339,15 +306,15 @@ def transfer_map(grid: TransferMap) -> list[Chart]:
             _corners(corners, downwards),
             _numbered(taught),
         ]
-        figure = make_figure(
+        figure = style.make_figure(
             traces,
-            x={"title": {"text": escaped(names[0])}, "showgrid": False},
-            y={"title": {"text": escaped(names[1])}, "showgrid": False},
+            x={"title": {"text": style.escaped(names[0])}, "showgrid": False},
+            y={"title": {"text": style.escaped(names[1])}, "showgrid": False},
         )
         if downwards:
             figure.update_yaxes(autorange="reversed")
         charts.append(
-            Chart(
+            style.Chart(
                 f"map-{part}",
                 title,
                 caption,
@@ -390,7 +357,7 @@ def _net_lines(net: np.ndarray) -> list[Any]:
                 mode="lines",
                 name=label,
                 line={
-                    "color": LIGHT[key],
+                    "color": style.LIGHT[key],
                     "width": 1.4,
                     "dash": "solid" if key == "plus" else "dot",
                 },
@@ -409,8 +376,8 @@ def _corners(corners: list[np.ndarray], downwards: bool) -> go.Scatter:
         mode="markers+text",
         text=["A", "B", "C", "D"],
         textposition=_outward(corners, downwards),
-        textfont={"size": 14, "color": LIGHT["ink"]},
-        marker={"size": 7, "color": LIGHT["ink"]},
+        textfont={"size": 14, "color": style.LIGHT["ink"]},
+        marker={"size": 7, "color": style.LIGHT["ink"]},
         cliponaxis=False,
         showlegend=False,
         hovertemplate="corner %{text}: %{x:.2f}, %{y:.2f}<extra></extra>",
@@ -425,8 +392,8 @@ def _numbered(taught: np.ndarray) -> go.Scatter:
         mode="markers+text",
         text=[str(i + 1) for i in range(len(taught))],
         textposition="middle center",
-        textfont={"size": 11, "color": LIGHT["surface"]},
-        marker={"size": 19, "color": LIGHT["paper"]},
+        textfont={"size": 11, "color": style.LIGHT["surface"]},
+        marker={"size": 19, "color": style.LIGHT["paper"]},
         showlegend=False,
         hovertemplate="demonstration %{text}: %{x:.2f}, %{y:.2f}"
         "<extra></extra>",

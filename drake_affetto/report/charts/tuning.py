@@ -6,7 +6,7 @@ import itertools
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from drake_affetto.report.style import LIGHT, Chart, escaped, make_figure
+from drake_affetto.report import style
 from drake_affetto.tuning.config import HELD_OUT, REST, TRAINING
 from drake_affetto.tuning.results import (
     ReferenceTraces,
@@ -20,7 +20,7 @@ TITLES = {
     REST: "rest in several postures",
 }
 
-_BEFORE, _AFTER = LIGHT["relearn"], LIGHT["transfer"]
+_BEFORE, _AFTER = style.LIGHT["relearn"], style.LIGHT["transfer"]
 
 
 def label(joint: str) -> str:
@@ -28,7 +28,7 @@ def label(joint: str) -> str:
     return joint.replace("_", " ")
 
 
-def history(details: TuningDetails, results: TuningResults) -> Chart:
+def history(details: TuningDetails, results: TuningResults) -> style.Chart:
     """The cost of each trial, and the least so far."""
     trials = sorted(details.trials, key=lambda row: row.number)
     complete = [row for row in trials if not row.pruned]
@@ -40,7 +40,7 @@ def history(details: TuningDetails, results: TuningResults) -> Chart:
             y=[row.cost for row in pruned],
             mode="markers",
             name="stopped early",
-            marker={"color": LIGHT["muted"], "symbol": "x", "size": 6},
+            marker={"color": style.LIGHT["muted"], "symbol": "x", "size": 6},
         ),
         go.Scatter(
             x=[row.number for row in complete],
@@ -65,12 +65,12 @@ def history(details: TuningDetails, results: TuningResults) -> Chart:
             line={"color": _BEFORE, "dash": "dash", "width": 2},
         ),
     ]
-    figure = make_figure(
+    figure = style.make_figure(
         traces,
         x={"title": {"text": "trial"}},
         y={"title": {"text": "cost"}, "type": "log", "tickformat": "~g"},
     )
-    return Chart(
+    return style.Chart(
         "tuning-history",
         "Cost of the trials",
         "The mean cost of all joints: tracking error, effort of the valves and "
@@ -89,15 +89,15 @@ def history(details: TuningDetails, results: TuningResults) -> Chart:
     )
 
 
-def importance(shares: Mapping[str, Mapping[str, float]]) -> Chart:
+def importance(shares: Mapping[str, Mapping[str, float]]) -> style.Chart:
     """The share of each gain in the variance of its joint's cost."""
     joints = list(shares)
     names = list(shares[joints[0]])
-    colors = [LIGHT[k] for k in ("random", "active", "gaussian_process")]
-    colors.append(LIGHT["continue"])
+    colors = [style.LIGHT[k] for k in ("random", "active", "gaussian_process")]
+    colors.append(style.LIGHT["continue"])
     traces = [
         go.Bar(
-            y=[escaped(label(joint)) for joint in joints],
+            y=[style.escaped(label(joint)) for joint in joints],
             x=[100.0 * shares[joint][name] for joint in joints],
             name=name,
             orientation="h",
@@ -106,14 +106,14 @@ def importance(shares: Mapping[str, Mapping[str, float]]) -> Chart:
         )
         for name, color in zip(names, colors, strict=True)
     ]
-    figure = make_figure(
+    figure = style.make_figure(
         traces,
         x={"title": {"text": "share, %"}, "range": [0, 100]},
         y={"autorange": "reversed"},
         barmode="stack",
         legend={"traceorder": "normal"},
     )
-    return Chart(
+    return style.Chart(
         "tuning-importance",
         "Importance of the gains",
         "The share of each gain in the variance of the logarithm of its "
@@ -134,7 +134,7 @@ def importance(shares: Mapping[str, Mapping[str, float]]) -> Chart:
     )
 
 
-def traces(name: str, reference: ReferenceTraces) -> Chart:
+def traces(name: str, reference: ReferenceTraces) -> style.Chart:
     """Joint angles along one reference, a row for each joint."""
     joints = list(reference.desired)
     figure = make_subplots(
@@ -142,11 +142,11 @@ def traces(name: str, reference: ReferenceTraces) -> Chart:
         cols=1,
         shared_xaxes=True,
         vertical_spacing=0.125 / max(len(joints), 2),
-        subplot_titles=[escaped(label(joint)) for joint in joints],
+        subplot_titles=[style.escaped(label(joint)) for joint in joints],
     )
     for i, joint in enumerate(joints):
         for angles, kind, color, width in (
-            (reference.desired, "desired", LIGHT["muted"], 2.5),
+            (reference.desired, "desired", style.LIGHT["muted"], 2.5),
             (reference.hand_tuned, "hand-tuned", _BEFORE, 1.3),
             (reference.tuned, "tuned", _AFTER, 1.3),
         ):
@@ -161,7 +161,7 @@ def traces(name: str, reference: ReferenceTraces) -> Chart:
                 row=i + 1,
                 col=1,
             )
-    figure.update_layout(template=make_figure().layout.template)
+    figure.update_layout(template=style.make_figure().layout.template)
     figure.update_layout(margin={"l": 8, "r": 14, "t": 60, "b": 8})
     figure.update_yaxes(ticksuffix="°")
     figure.update_xaxes(title_text="time, s", row=len(joints), col=1)
@@ -171,7 +171,7 @@ def traces(name: str, reference: ReferenceTraces) -> Chart:
         pairs = zip(angles[joint], reference.desired[joint], strict=False)
         return f"{max(abs(q - goal) for q, goal in pairs):.1f}"
 
-    return Chart(
+    return style.Chart(
         f"tuning-{name.replace('_', '-')}",
         f"Before and after: {TITLES.get(name, label(name))} ({kind})",
         "Joint angles along the reference, with the hand-tuned and with the "

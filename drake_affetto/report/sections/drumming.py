@@ -6,13 +6,7 @@ from drake_affetto.experiments.results import (
     TaughtPosition,
 )
 from drake_affetto.report import wording
-from drake_affetto.report.charts.drumming import (
-    learning_curve,
-    separation,
-    similarity,
-    task_space,
-    workspace,
-)
+from drake_affetto.report.charts import drumming as charts
 from drake_affetto.report.parts import Section, Statement, in_pairs
 from drake_affetto.report.report_data import Drumming, ReportData
 from drake_affetto.sound.reward import SUCCESS_THRESHOLD
@@ -25,10 +19,10 @@ def make(data: ReportData) -> Section | None:
         return None
     results = data.results("drum")
     threshold = results.separation.threshold if results else SUCCESS_THRESHOLD
-    charts = []
+    drawn = []
     if results:
-        charts.append(
-            learning_curve(
+        drawn.append(
+            charts.learning_curve(
                 results.by_demonstrations,
                 results.active.by_demonstrations if results.active else None,
                 evaluations=results.evaluations,
@@ -36,19 +30,21 @@ def make(data: ReportData) -> Section | None:
             )
         )
     positions = (drumming.taught, drumming.tests, threshold)
-    charts.append(workspace(*positions))
+    drawn.append(charts.workspace(*positions))
     if results and results.similarity:
         traces = results.similarity
-        charts.append(similarity(traces.t, traces.hit, traces.miss, threshold))
+        drawn.append(
+            charts.similarity(traces.t, traces.hit, traces.miss, threshold)
+        )
     if results and results.rewards:
-        charts.append(
-            separation(
+        drawn.append(
+            charts.separation(
                 results.rewards, threshold, results.separation.impulse_threshold
             )
         )
-    seen = task_space(*positions)
-    if seen is not None and len(charts) % 2:
-        charts.insert(1 + len(charts) // 2, seen)
+    seen = charts.task_space(*positions)
+    if seen is not None and len(drawn) % 2:
+        drawn.insert(1 + len(drawn) // 2, seen)
     statement = Statement("transfer", "Results", _sentences(drumming, results))
     return Section(
         "drum",
@@ -59,9 +55,9 @@ def make(data: ReportData) -> Section | None:
                 drumming.demonstrations, "demonstration"
             ),
             "statements": [statement],
-            "charts": in_pairs(charts),
+            "charts": in_pairs(drawn),
         },
-        tuple(charts),
+        tuple(drawn),
     )
 
 

@@ -3,12 +3,7 @@
 import dataclasses
 
 from drake_affetto.report import wording
-from drake_affetto.report.charts.transfer import (
-    rewards_by_scheme,
-    significance,
-    success_by_scheme,
-    transfer_map,
-)
+from drake_affetto.report.charts import transfer as charts
 from drake_affetto.report.comparison import SchemeComparison
 from drake_affetto.report.parts import Section, Statement, in_pairs
 from drake_affetto.report.report_data import ReportData
@@ -22,16 +17,18 @@ def make(data: ReportData) -> Section | None:
     if comparison is None:
         return None
     in_mirror = comparison.scenario == "mirror"
-    charts = [success_by_scheme(comparison)]
-    rewards = rewards_by_scheme(comparison)
+    drawn = [charts.success_by_scheme(comparison)]
+    rewards = charts.rewards_by_scheme(comparison)
     if rewards:
-        charts.append(rewards)
+        drawn.append(rewards)
     matrices = []
     if comparison.tested:
-        matrices = [significance(comparison, n) for n in comparison.samples]
+        matrices = [
+            charts.significance(comparison, n) for n in comparison.samples
+        ]
     maps, scheme, count = [], "", ""
     if comparison.map:
-        maps = transfer_map(comparison.map)
+        maps = charts.transfer_map(comparison.map)
         scheme = wording.in_text(comparison.map.scheme)
         count = wording.number(comparison.map.samples, "demonstration")
     conclusions = [conclude(comparison, n) for n in comparison.samples]
@@ -50,14 +47,14 @@ def make(data: ReportData) -> Section | None:
             "untested": not comparison.tested and comparison.trials > 0,
             "trials": comparison.trials,
             "trials_text": wording.number(comparison.trials, "trial"),
-            "charts": in_pairs(charts),
+            "charts": in_pairs(drawn),
             "key": _key(comparison),
             "matrices": matrices,
             "maps": in_pairs(maps),
             "map_scheme": scheme,
             "map_samples": count,
         },
-        (*charts, *matrices, *maps),
+        (*drawn, *matrices, *maps),
     )
 
 
