@@ -385,6 +385,7 @@ TESTED_IN = {
     "identification/results": "identification/test_study.py",
     "motion/encoding": "motion/test_dmp.py",
     "motion/spring": "motion/test_dmp.py",
+    "motion/stepping": "motion/test_dmp.py",
     "perception/config": "perception/test_mirror_camera.py",
     "report/charts": "report/test_page.py",
     "report/parts": "report/test_page.py",

@@ -3,7 +3,6 @@
 import time
 
 import numpy as np
-from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import (
     DiagramBuilder,
@@ -11,6 +10,7 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 from pydrake.systems.primitives import ConstantVectorSource, MatrixGain
+from reference_plant import STEP, add_reference_plant, lock_all_but
 
 from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.pneumatics.actuation import PneumaticActuation
@@ -23,14 +23,11 @@ from drake_affetto.pneumatics.parameters import (
 from drake_affetto.scene.world import (
     ACTIVE_JOINTS,
     WorldConfig,
-    add_world,
     joint_limits,
     joint_names,
-    lock_inactive,
     select_joints,
 )
 
-_STEP = 0.001
 _SLICE = 0.05
 _TRIES = 100
 
@@ -54,17 +51,17 @@ class NumpyActuation(LeafSystem):
         self._torque = self.DeclareDiscreteState(n)
         self._spool = self.DeclareDiscreteState(2 * n)
         self._bristle = self.DeclareDiscreteState(n)
-        slots = round(float(np.max(par[Row.DEAD_TIME])) / _STEP) + 1
+        slots = round(float(np.max(par[Row.DEAD_TIME])) / STEP) + 1
         self._line = np.zeros((slots, n))
         self.DeclareStateOutputPort("actuation", self._torque)
-        self.DeclarePeriodicDiscreteUpdateEvent(_STEP, 0.0, self._update)
+        self.DeclarePeriodicDiscreteUpdateEvent(STEP, 0.0, self._update)
 
     get_command_input_port = input_port("v⁺ (n).", index=0)
     get_estimated_state_input_port = input_port("[q; q̇] (2n).")
     get_actuation_output_port = output_port("Torque (n), N m.")
 
     def _update(self, context, discrete_state):
-        par, n, h = self._par, self._n, _STEP
+        par, n, h = self._par, self._n, STEP
         state = self._state_port.Eval(context)
         q, v = state[:n], state[n:]
         self._line = np.roll(self._line, 1, axis=0)
@@ -121,14 +118,7 @@ def _simulator(names, make):
     in all variants, and what differs is the actuators' cost alone.
     """
     builder = DiagramBuilder()
-    plant, _ = AddMultibodyPlant(
-        MultibodyPlantConfig(
-            time_step=_STEP, discrete_contact_approximation="lagged"
-        ),
-        builder,
-    )
-    add_world(plant, WorldConfig())
-    plant.Finalize()
+    plant = add_reference_plant(builder, WorldConfig())
     robot = plant.GetModelInstanceByName("affetto")
     selection = select_joints(plant, names)
     n = len(names)
@@ -161,7 +151,7 @@ def _simulator(names, make):
         )
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
-    lock_inactive(plant, plant.GetMyMutableContextFromRoot(context), names)
+    lock_all_but(plant, context, names)
     simulator = Simulator(diagram, context)
     simulator.AdvanceTo(0.2)  # compiles, fills caches
     return simulator
@@ -183,17 +173,15 @@ def measure(names) -> tuple[float, float, float]:
             begin = time.process_time()
             simulator.AdvanceTo(0.2 + (k + 1) * _SLICE)
             spent = time.process_time() - begin
-            least[i] = min(least[i], 1e6 * spent * _STEP / _SLICE)
+            least[i] = min(least[i], 1e6 * spent * STEP / _SLICE)
     return least[0], least[1], least[2]
 
 
 def run() -> None:
     """Prints the net cost of the actuators of 8 and of 22 joints."""
-    builder = DiagramBuilder()
-    plant, _ = AddMultibodyPlant(MultibodyPlantConfig(time_step=_STEP), builder)
-    add_world(plant, WorldConfig())
-    plant.Finalize()
-    everything = joint_names(plant)
+    everything = joint_names(
+        add_reference_plant(DiagramBuilder(), WorldConfig())
+    )
     print("CPU time a step of 1 ms; net = over the bare plant")
     for names in (list(ACTIVE_JOINTS), everything):
         bare, compiled, plain = measure(names)

@@ -186,7 +186,7 @@ def pidf_update(
 
     Args:
         h: period of the updates, s.
-        gains: (4, n) rows kP, kI, kD, kF.
+        gains: (4, n) rows kP, kI, kD, kF, or the same as one row (4n).
         integral_limit: limit of kI ∫e dt, Pa.
         difference_limit: limit of the demand u, Pa.
         integral_deadband: error that is not integrated, rad.
@@ -198,18 +198,19 @@ def pidf_update(
         demand: (n) u, Pa; set.
         opening: (n) v⁺ in [-1, 1]; set.
     """
-    n = gains.shape[1]
+    n = integral.size
+    rows = gains.reshape(4, n)
     for i in range(n):
         error = desired_state[i] - estimated_state[i]
         error_rate = desired_state[n + i] - estimated_state[n + i]
-        k_i = gains[1, i]
-        proportional = gains[0, i] * error + gains[2, i] * error_rate
+        k_i = rows[1, i]
+        proportional = rows[0, i] * error + rows[2, i] * error_rate
         difference = pressure[i] - pressure[n + i]
 
         excess = error - min(max(error, -integral_deadband), integral_deadband)
         trial = integral[i] + h * excess
         u = proportional + offset[i] + k_i * trial
-        v = gains[3, i] * (
+        v = rows[3, i] * (
             min(max(u, -difference_limit), difference_limit) - difference
         )
         limited = abs(v) > 1.0 or abs(u) > difference_limit
@@ -226,5 +227,5 @@ def pidf_update(
         u = proportional + offset[i] + k_i * trial
         u = min(max(u, -difference_limit), difference_limit)
         demand[i] = u
-        v = gains[3, i] * (u - difference)
+        v = rows[3, i] * (u - difference)
         opening[i] = min(max(v, -1.0), 1.0)

@@ -10,7 +10,6 @@ from pydrake.systems.framework import (
     Context,
     DiagramBuilder,
     DiscreteValues,
-    EventStatus,
     LeafSystem,
 )
 
@@ -72,6 +71,9 @@ class PidfController(LeafSystem):
     Both outputs are state. The gains are a numeric parameter of the context
     (`set_gains`).
     """
+
+    # Indices of the input ports, in the order of their declaration.
+    _DESIRED, _STATE, _PRESSURE, _OFFSET = range(4)
 
     def __init__(
         self,
@@ -223,24 +225,22 @@ class PidfController(LeafSystem):
         integral = np.divide(share, k_i, out=np.zeros(self._n), where=k_i > 0.0)
         context.SetDiscreteState(self._integral_index, integral)
 
-    def _update(
-        self, context: Context, discrete_state: DiscreteValues
-    ) -> EventStatus:
+    def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
+        # Views of the inputs: a port's `Eval` would copy.
+        read = self.EvalVectorInput
+        mutable = discrete_state.get_mutable_value
         offset = self._no_offset
         if self._offset_port.HasValue(context):
-            offset = self._offset_port.Eval(context)
+            offset = read(context, self._OFFSET).value()
         pidf_update(
             self._period,
-            context.get_numeric_parameter(self._gains_index)
-            .value()
-            .reshape(4, self._n),
+            context.get_numeric_parameter(self._gains_index).value(),
             *self._limits,
-            self._desired_port.Eval(context),
-            self._state_port.Eval(context),
-            self._pressure_port.Eval(context),
+            read(context, self._DESIRED).value(),
+            read(context, self._STATE).value(),
+            read(context, self._PRESSURE).value(),
             offset,
-            discrete_state.get_mutable_value(self._integral_index),
-            discrete_state.get_mutable_value(self._demand_index),
-            discrete_state.get_mutable_value(self._opening_index),
+            mutable(self._integral_index),
+            mutable(self._demand_index),
+            mutable(self._opening_index),
         )
-        return EventStatus.Succeeded()

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import dataclasses
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatVisualizerParams
+from pydrake.geometry import Meshcat, MeshcatVisualizerParams, SceneGraph
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator
 from pydrake.systems.framework import (
     Context,
@@ -62,7 +62,8 @@ class Recording:
     """The recording of a movement.
 
     Attributes:
-        t: Times of the contacts since the movement's start (T,), s.
+        t: Times of the contacts since the movement's start (T,), s: the middle
+            of the plant's step over which a force is the mean.
         contact_force: Force on the head, N, and distance of the contact from
             its center, m (T, 2).
         knock_force: Forces on the shell and on the table (T, 2), N.
@@ -164,10 +165,13 @@ class TrialRunner:
         self.reward_config = sound.reward
         self.meshcat = meshcat
         self._settled: Context | None = None
+        self._taps: list[Array] | None = None
 
     def tap_prototypes(self) -> list[Array]:
         """Prototypes of the drum's sound when a person taps it."""
-        return tap_prototypes(self.voice, self.reward_config)
+        if self._taps is None:
+            self._taps = tap_prototypes(self.voice, self.reward_config)
+        return self._taps
 
     def spectrogram(self, recording: Recording) -> Array:
         """(bands, frames) of a recording's sound."""
@@ -343,11 +347,26 @@ class TrialRunner:
             self.simulator.Initialize()
             self._advance(self._start_time + self.scenario.settling_duration)
             self._settled = self.context.Clone()
-        self.context.SetTimeStateAndParametersFrom(self._settled)
+        self._restore(self._settled)
         self.station.set_drum_position(self._station_context, xy)
         self._clear_logs()
         self.simulator.Initialize()
         return self.context.get_time()
+
+    def _restore(self, settled: Context) -> None:
+        """Takes time, state and parameters over from another context.
+
+        All but the geometries, which no trial changes: to copy them means to
+        copy the render engines, forty times the cost of all else.
+        """
+        self.context.SetTime(settled.get_time())
+        for system in self.station.GetSystems():
+            if not isinstance(system, SceneGraph):
+                system.GetMyMutableContextFromRoot(
+                    self.context
+                ).SetStateAndParametersFrom(
+                    system.GetMyContextFromRoot(settled)
+                )
 
     def _enable_gaze(self, seed: int) -> None:
         gaze, camera = self.station.gaze, self.station.camera
@@ -386,7 +405,8 @@ class TrialRunner:
         _, knock = self._log("drum.knock_force")
         _, flow = self._log("affetto.mass_flow")
         joint_t, state = self._log("affetto.estimated_state")
-        t = t - start
+        # A contact's force is that over the plant's step from then on.
+        t = t - start + 0.5 * self.scenario.plant_config.time_step
         sound = self.voice.synthesize(
             t,
             contact[:, 0],

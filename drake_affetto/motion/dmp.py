@@ -49,6 +49,12 @@ from drake_affetto.motion.encoding import (
     smoothing_operator,
 )
 from drake_affetto.motion.spring import spring_transition
+from drake_affetto.motion.stepping import (
+    NO_FORCING,
+    NO_WEIGHTS,
+    StepTable,
+    advance_joints,
+)
 
 # How many time grids a Dmp remembers the responses of.
 _REMEMBERED_GRIDS = 16
@@ -61,25 +67,6 @@ class Rollout(NamedTuple):
     q: Array
     q_dot: Array
     q_ddot: Array
-
-
-class StepTable(NamedTuple):
-    """All that a step of fixed length needs, for every phase on its grid.
-
-    Attributes:
-        transition: (2, 2), carries [q - g; q̇] over one step.
-        forcing: (N, 2, K), what the forcing adds in the step that begins at
-            phase 1 - i · phase_step.
-        phase_step: by how much the phase falls in one step.
-        dt: s, length of a step.
-        duration: s, T.
-    """
-
-    transition: Array
-    forcing: Array
-    phase_step: float
-    dt: float
-    duration: float
 
 
 class _Cache:
@@ -309,12 +296,11 @@ class Dmp:
         Returns:
             The phase at the end of the step.
         """
-        state[0] -= goal
-        moved = table.transition @ state
         if weights is not None and phase > 0.0:
-            moved += self._forcing(phase, table) @ weights.T
-        moved[0] += goal
-        state[:] = moved
+            forcing = self._forcing(phase, table)
+        else:
+            forcing, weights = NO_FORCING, NO_WEIGHTS
+        advance_joints(state, goal, table.transition, forcing, weights)
         phase -= table.phase_step
         # What is left after the last step of a whole number is rounding.
         return phase if phase > 1e-9 * table.phase_step else 0.0

@@ -55,6 +55,9 @@ class DmpSource(LeafSystem):
         InputError: if a value does not fit.
     """
 
+    # Indices of the input ports, in the order of their declaration.
+    _THETA, _START = 0, 1
+
     def __init__(
         self,
         dmp: Dmp,
@@ -69,6 +72,8 @@ class DmpSource(LeafSystem):
         self._dmp = dmp
         self._n = num_joints
         self._period = float(update_period)
+        # Of the latest duration: each context has its own.
+        self._table = dmp.step_table(self._period, dmp.duration)
         posture = np.zeros(num_joints)
         if start_posture is not None:
             posture[:] = self._checked_posture(start_posture)
@@ -166,8 +171,12 @@ class DmpSource(LeafSystem):
         ).get_mutable_value()
         goal = context.get_numeric_parameter(self._posture_index).value()
         duration = context.get_numeric_parameter(self._duration_index).value()
-        table = dmp.step_table(self._period, float(duration[0]))
-        start_time: Any = self._start_time_input.Eval(context)
+        table = self._table
+        if table.duration != duration[0]:
+            table = dmp.step_table(self._period, float(duration[0]))
+            self._table = table
+        # Views of the inputs: a port's `Eval` would copy.
+        start_time: Any = self.EvalVectorInput(context, self._START).value()
         # Times of events are products of the period, and round differently
         # from sums such as "now plus a delay".
         started = context.get_time() >= start_time[0] - 1e-6 * self._period
@@ -175,7 +184,7 @@ class DmpSource(LeafSystem):
             phase[0] = 1.0
             dmp.advance(0.0, state.reshape(2, -1), None, goal, table)
             return
-        weights: Any = self._parameters_input.Eval(context)
+        weights: Any = self.EvalVectorInput(context, self._THETA).value()
         phase[0] = dmp.advance(
             float(phase[0]),
             state.reshape(2, -1),

@@ -19,14 +19,18 @@ from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.geometry.optics import Camera
 from drake_affetto.perception.blob import BlobCalibration
 from drake_affetto.perception.gaze import (
+    PHASE,
     TAU_1,
     TAU_2,
     Gaze,
     GazeConfig,
     GazeMode,
+    GazePhase,
     GazeTask,
     GazeView,
 )
+
+_NO = np.zeros(1)
 
 
 def gaze_view(camera: Camera, calibration: BlobCalibration) -> GazeView:
@@ -113,6 +117,7 @@ class GazeServo(LeafSystem):
 
         task = self.DeclareNumericParameter(BasicVector(GazeTask().to_vector()))
         self._task_index = int(task)
+        self._tasks: dict[bytes, GazeTask] = {}
         self._blob_port = self.DeclareVectorInputPort("blob", 3)
         self._state_port = self.DeclareVectorInputPort("estimated_state", 2 * n)
         self._gaze_state = int(
@@ -230,8 +235,17 @@ class GazeServo(LeafSystem):
 
     # Events
 
+    def _known_task(self, context: Context) -> GazeTask:
+        """`task`, not to be changed: made once for each that is asked for."""
+        values = context.get_numeric_parameter(self._task_index).value()
+        key = values.tobytes()
+        if key not in self._tasks:
+            self._tasks = {key: GazeTask.from_vector(values)}
+        return self._tasks[key]
+
     def _gaze_values(self, context: Context) -> np.ndarray:
-        return context.get_discrete_state(self._gaze_state).CopyToVector()
+        """The state (SIZE,), not to be changed."""
+        return context.get_discrete_state(self._gaze_state).value()
 
     def _measure(self, context: Context) -> np.ndarray:
         """One image as a row: time, x_img, y_img, found, yaw."""
@@ -282,9 +296,14 @@ class GazeServo(LeafSystem):
 
     # Outputs
 
+    # These are asked for at every tick of the controller, mostly while nothing
+    # is looked for: the phase alone then tells.
+
     def _calc_yaw_command(self, context: Context, output: BasicVector) -> None:
         x = self._gaze_values(context)
-        yaw = self._gaze.yaw_command(x, context.get_time(), self.task(context))
+        yaw = self._gaze.yaw_command(
+            x, context.get_time(), self._known_task(context)
+        )
         output.SetFromVector(np.array([yaw]))
 
     def _calc_task_parameter(
@@ -298,6 +317,9 @@ class GazeServo(LeafSystem):
 
     def _calc_settled(self, context: Context, output: BasicVector) -> None:
         x = self._gaze_values(context)
+        if x[PHASE] != GazePhase.SETTLED:
+            output.SetFromVector(_NO)
+            return
         settled = self._gaze.is_settled(x, self.task(context))
         output.SetFromVector(np.array([float(settled)]))
 
@@ -308,5 +330,8 @@ class GazeServo(LeafSystem):
 
     def _calc_ready(self, context: Context, output: BasicVector) -> None:
         x = self._gaze_values(context)
+        if x[PHASE] != GazePhase.SETTLED:
+            output.SetFromVector(_NO)
+            return
         ready = self._gaze.is_ready(x, context.get_time(), self.task(context))
         output.SetFromVector(np.array([float(ready)]))

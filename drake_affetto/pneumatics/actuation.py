@@ -47,10 +47,8 @@ class PneumaticActuationConfig:
         overlays: YAML files that change some of them, for instance a fit.
         time_step: Update period, s; the plant's.
         look_ahead: Steps by which the joint state that the update reads lags
-            behind the one the torque will act on. 0 for a MultibodyPlant with
-            sampled output ports (its default): its step is an unrestricted
-            update, which Drake does before the discrete ones of that instant.
-            1 for a plant without them, which steps at the same time.
+            behind the one the torque will act on. 0 for a MultibodyPlant of
+            this step, with or without sampled output ports.
     """
 
     mode: str = "flow"
@@ -96,11 +94,15 @@ class PneumaticActuation(LeafSystem):
     - `mass_flow` (2n): mean flow into each chamber over the last step, kg/s;
       negative while it vents.
 
-    All outputs are state, advanced every `time_step`: reading them costs no
-    call into Python. The parameter array of `chamber.Row` is a numeric
-    parameter of the context, so that actuators can be varied without building
-    a new diagram.
+    All outputs are state, advanced every `time_step`, halfway between two
+    steps of the plant: an update reads the joints as one step has left them,
+    and its torque is the next one's. Reading them costs no call into Python.
+    The parameter array of `chamber.Row` is a numeric parameter of the context,
+    so that actuators can be varied without building a new diagram.
     """
+
+    # Indices of the input ports, in the order of their declaration.
+    _COMMAND, _STATE = 0, 1
 
     def __init__(
         self,
@@ -172,7 +174,9 @@ class PneumaticActuation(LeafSystem):
         self.DeclareStateOutputPort("chamber_pressure", self._pressure_index)
         self.DeclareStateOutputPort("mass_flow", self._flow_index)
         self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=self._time_step, offset_sec=0.0, update=self._update
+            period_sec=self._time_step,
+            offset_sec=0.5 * self._time_step,
+            update=self._update,
         )
 
     @staticmethod
@@ -339,8 +343,9 @@ class PneumaticActuation(LeafSystem):
             self._mode,
             self._look_ahead,
             context.get_numeric_parameter(self._parameter_index).value(),
-            self._command_port.Eval(context),
-            self._state_port.Eval(context),
+            # Views: a port's `Eval` would copy.
+            self.EvalVectorInput(context, self._COMMAND).value(),
+            self.EvalVectorInput(context, self._STATE).value(),
             mutable(self._pressure_index),
             mutable(self._torque_index),
             mutable(self._flow_index),

@@ -41,6 +41,7 @@ from drake_affetto.pneumatics.actuation import PneumaticActuation
 from drake_affetto.scene import world
 from drake_affetto.skill.policy import SkillPolicy
 from drake_affetto.sound.microphone import DrumMicrophone
+from drake_affetto.station.joint_state import make_joint_state
 from drake_affetto.station.scenario import Scenario
 from drake_affetto.teaching.kinesthetic_teacher import KinestheticTeacher
 from drake_affetto.teaching.mouse_teacher import MouseTeacher
@@ -55,9 +56,9 @@ class AffettoStation(Diagram):
     posture, what is taught and what is played are parameters and state of the
     context (`set_drum_position`, `reset`, and the systems' own setters).
 
-    Joints that are not active are locked in the context; contexts from
-    `CreateDefaultContext` of this class are ready. A `Simulator` made without
-    a context makes its own: call `reset` on it first.
+    Joints that are not active are welded at the scenario's posture. Contexts
+    from `CreateDefaultContext` of this class are ready. A `Simulator` made
+    without a context makes its own: call `reset` on it first.
 
     .. pydrake_system::
 
@@ -88,7 +89,8 @@ class AffettoStation(Diagram):
 
     With n active joints, in the scenario's order:
 
-    - affetto.estimated_state, affetto.desired_state (2n): rad, rad/s.
+    - affetto.estimated_state, affetto.desired_state (2n): rad, rad/s, both at
+      the same time (see `joint_state`).
     - affetto.valve_opening (n): v⁺ in [-1, 1].
     - affetto.pid_output (n): u_PID, Pa.
     - affetto.actuation (n): N m.
@@ -146,6 +148,7 @@ class AffettoStation(Diagram):
             scenario.plant_config, builder
         )
         world.add_world(self.plant, scenario.world)
+        world.weld_inactive(self.plant, scenario.active_joints)
         self.plant.Finalize()
         self.joints = world.select_joints(self.plant, scenario.active_joints)
         self._yaw = scenario.active_joints.index(scenario.yaw_joint)
@@ -191,7 +194,7 @@ class AffettoStation(Diagram):
         )
 
     def CreateDefaultContext(self) -> Context:
-        """A context at the start posture, inactive joints locked."""
+        """A context at the start posture."""
         context = super().CreateDefaultContext()
         self.reset(context)
         return context
@@ -208,11 +211,6 @@ class AffettoStation(Diagram):
         """
         mine = self._mine(context)
         self.SetDefaultContext(mine)
-        world.lock_inactive(
-            self.plant,
-            self._sub(self.plant, context),
-            self.joints.names,
-        )
         self._balance_gravity(context)
         if self.scenario.motion_source == "skill":
             look = self.scenario.look
@@ -289,6 +287,9 @@ class AffettoStation(Diagram):
             self._sub(self.plant, context),
             dict(zip(self.joints.names, np.asarray(q, float), strict=True)),
         )
+        self._joint_state.SetDefaultContext(
+            self._sub(self._joint_state, context)
+        )
 
     def _mine(self, context: Context) -> Context:
         """The station's context, from itself or from the root's."""
@@ -303,17 +304,17 @@ class AffettoStation(Diagram):
         return self.GetMutableSubsystemContext(system, self._mine(context))
 
     def _add_estimation(self, builder: DiagramBuilder) -> OutputPort:
-        select = builder.AddNamedSystem(
-            "joint_state", MatrixGain(D=self.joints.state_matrix)
+        self._joint_state = builder.AddNamedSystem(
+            "joint_state",
+            make_joint_state(self.joints, self.scenario.plant_config.time_step),
         )
         builder.Connect(
             self.plant.get_state_output_port(self._robot),
-            select.get_input_port(),
+            self._joint_state.get_input_port(),
         )
-        builder.ExportOutput(
-            select.get_output_port(), "affetto.estimated_state"
-        )
-        return select.get_output_port()
+        estimated = self._joint_state.get_output_port()
+        builder.ExportOutput(estimated, "affetto.estimated_state")
+        return estimated
 
     def _add_teacher(
         self, builder: DiagramBuilder, mouse: Meshcat | None

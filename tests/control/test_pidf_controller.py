@@ -30,8 +30,9 @@ from drake_affetto.scene.world import (
     add_world,
     get_joint,
     joint_limits,
-    lock_inactive,
     select_joints,
+    set_posture,
+    weld_inactive,
 )
 
 N = 2
@@ -192,6 +193,7 @@ class Body:
         )
         plant = self.plant
         add_world(plant, WorldConfig())
+        weld_inactive(plant, ACTIVE_JOINTS)
         plant.Finalize()
         robot = plant.GetModelInstanceByName("affetto")
         selection = select_joints(plant, ACTIVE_JOINTS)
@@ -252,10 +254,9 @@ class Body:
         """Angles (n, N) and pressures (2n, N) at 100 Hz."""
         context = self.diagram.CreateDefaultContext()
         plant_context = self.plant.GetMyMutableContextFromRoot(context)
-        lock_inactive(
+        set_posture(
             self.plant,
             plant_context,
-            ACTIVE_JOINTS,
             dict(zip(ACTIVE_JOINTS, map(float, start), strict=True)),
         )
         gravity = -self.plant.CalcGravityGeneralizedForces(plant_context)

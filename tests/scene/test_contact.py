@@ -127,11 +127,6 @@ def test_a_hard_fall_on_the_table_sinks_in_at_most_two_millimeters():
         ),
         builder,
     )
-    world.add_world(plant, world.WorldConfig(drum_position=[0.45, 0.25]))
-    plant.Finalize()
-    diagram = builder.Build()
-    simulator = Simulator(diagram)
-    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
     # Leaning far forward, the arm stretched out over the table.
     posture = {
         "waist_pitch": 0.65,
@@ -144,9 +139,17 @@ def test_a_hard_fall_on_the_table_sinks_in_at_most_two_millimeters():
         "right_elbow_rotation": 0.0,
         "right_wrist_flexion": -0.7,
     }
-    world.lock_inactive(plant, context, ["right_shoulder_flexion"], posture)
+    world.add_world(
+        plant,
+        world.WorldConfig(drum_position=[0.45, 0.25], default_posture=posture),
+    )
+    world.weld_inactive(plant, ["right_shoulder_flexion"])
+    plant.Finalize()
+    diagram = builder.Build()
+    simulator = Simulator(diagram)
+    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
     robot = plant.GetModelInstanceByName("affetto")
-    plant.get_actuation_input_port(robot).FixValue(context, np.zeros(22))
+    plant.get_actuation_input_port(robot).FixValue(context, np.zeros(1))
     shoulder = world.get_joint(plant, "right_shoulder_flexion")
     shoulder.set_angular_rate(context, -4.0)
     query_port = plant.get_geometry_query_input_port()

@@ -110,20 +110,37 @@ def test_bad_postures_are_refused_as_a_whole(scene, posture, told):
     assert world.get_posture(scene.plant, scene.context) == before
 
 
-def test_inactive_joints_are_locked_and_stay(scene):
-    posture = {"neck_yaw": 0.4, "right_elbow_flexion": 1.5}
-    world.lock_inactive(scene.plant, scene.context, ACTIVE, posture)
-    for name in world.joint_names(scene.plant):
-        joint = world.get_joint(scene.plant, name)
-        assert joint.is_locked(scene.context) == (name not in ACTIVE)
-    found = world.get_posture(scene.plant, scene.context)
-    assert found["neck_yaw"] == 0.4
-    assert found["right_elbow_flexion"] == 1.5
-    world.lock_inactive(scene.plant, scene.context, ["neck_yaw"])
-    joint = world.get_joint(scene.plant, "neck_yaw")
-    assert not joint.is_locked(scene.context)
+def test_inactive_joints_are_welded_where_they_stand():
+    plant, others = (
+        MultibodyPlant(time_step=0.001),
+        {"neck_yaw": 0.4, "right_wrist_flexion": -0.2},
+    )
+    config = world.WorldConfig(
+        default_posture={**others, "right_elbow_flexion": 1.5}
+    )
+    world.add_world(plant, config)
+    full = MultibodyPlant(time_step=0.001)
+    world.add_world(full, config)
+    full.Finalize()
     with pytest.raises(InputError, match="no joint 'elbow'"):
-        world.lock_inactive(scene.plant, scene.context, ["elbow"])
+        world.weld_inactive(plant, ["elbow"])
+    world.weld_inactive(plant, ACTIVE)
+    plant.Finalize()
+    assert sorted(world.joint_names(plant)) == sorted(ACTIVE)
+    assert plant.num_positions() == plant.num_actuators() == len(ACTIVE)
+    # The same body: every link stands where it does with all joints.
+    a, b = plant.CreateDefaultContext(), full.CreateDefaultContext()
+    for context, each in ((a, plant), (b, full)):
+        world.set_posture(each, context, {"waist_yaw": 0.2})
+    robot = full.GetModelInstanceByName("affetto")
+    for index in full.GetBodyIndices(robot):
+        body = full.get_body(index)
+        twin = plant.GetBodyByName(
+            body.name(), plant.GetModelInstanceByName("affetto")
+        )
+        X_a, X_b = twin.EvalPoseInWorld(a), body.EvalPoseInWorld(b)
+        assert X_a.IsNearlyEqualTo(X_b, 1e-12), body.name()
+    assert plant.CalcTotalMass(a) == pytest.approx(full.CalcTotalMass(b))
 
 
 def test_a_selection_picks_state_and_actuation_by_name(scene):
