@@ -75,6 +75,19 @@ def test_drakes_own_configs_are_read(tmp_path):
             "s.plant_config.time_step is 0.5",
         ),
         (
+            "plant_config:\n  time_step: 0.002",
+            "a divisor of the period of s.control.period, 0.005 s",
+        ),
+        ("camera:\n  rate: 30.0", "divisor of the period of s.camera.rate"),
+        (
+            "teaching:\n  update_rate: 300.0",
+            "divisor of the period of s.teaching.update_rate",
+        ),
+        (
+            "teaching:\n  recording_rate: 30.0",
+            "divisor of the period of s.teaching.recording_rate",
+        ),
+        (
             "plant_config:\n  timestep: 0.5",
             "s.plant_config has no field 'timestep'",
         ),
