@@ -112,11 +112,9 @@ class PidfController(LeafSystem):
         self._gains_index = int(
             self.DeclareNumericParameter(BasicVector(gains.to_array().ravel()))
         )
-        self._desired_port = self.DeclareVectorInputPort("desired_state", 2 * n)
-        self._state_port = self.DeclareVectorInputPort("estimated_state", 2 * n)
-        self._pressure_port = self.DeclareVectorInputPort(
-            "chamber_pressure", 2 * n
-        )
+        self.DeclareVectorInputPort("desired_state", 2 * n)
+        self.DeclareVectorInputPort("estimated_state", 2 * n)
+        self.DeclareVectorInputPort("chamber_pressure", 2 * n)
         self._offset_port = self.DeclareVectorInputPort("equilibrium_offset", n)
         self._no_offset = np.zeros(n)
         self._integral_index = self.DeclareDiscreteState(n)

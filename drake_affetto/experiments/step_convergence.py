@@ -236,13 +236,14 @@ def _movements(
     # The drum's place itself is the task parameter: no image is needed.
     region = loaded.drum_region
     config = dataclasses.replace(loaded.skill, input_range=[region.x, region.y])
-    movements = []
-    for k, xy in enumerate(unseen):
-        skill = make_skill(config, seed)
-        count = SKILLS[k % len(SKILLS)]
-        skill.fit(taught[:count], theta[:count])
-        movements.append((xy, skill.predict(xy[None])[0]))
-    return movements
+    skills = [
+        make_skill(config, seed).fit(taught[:count], theta[:count])
+        for count in SKILLS
+    ]
+    return [
+        (xy, skills[k % len(skills)].predict(xy[None])[0])
+        for k, xy in enumerate(unseen)
+    ]
 
 
 def difference(

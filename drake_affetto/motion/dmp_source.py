@@ -79,12 +79,10 @@ class DmpSource(LeafSystem):
             posture[:] = self._checked_posture(start_posture)
 
         n_basis = dmp.n_basis
-        self._parameters_input = self.DeclareVectorInputPort(
+        self.DeclareVectorInputPort(
             name="policy_parameters", size=num_joints * n_basis
         )
-        self._start_time_input = self.DeclareVectorInputPort(
-            name="start_time", size=1
-        )
+        self.DeclareVectorInputPort(name="start_time", size=1)
         self._posture_index = self.DeclareNumericParameter(BasicVector(posture))
         self._duration_index = self.DeclareNumericParameter(
             BasicVector(np.array([dmp.duration]))

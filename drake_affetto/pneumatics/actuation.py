@@ -153,12 +153,10 @@ class PneumaticActuation(LeafSystem):
             self.DeclareNumericParameter(BasicVector(array.ravel()))
         )
         if self._mode == FLOW_MODE:
-            self._command_port = self.DeclareVectorInputPort("valve_opening", n)
+            self.DeclareVectorInputPort("valve_opening", n)
         else:
-            self._command_port = self.DeclareVectorInputPort(
-                "pressure_command", 2 * n
-            )
-        self._state_port = self.DeclareVectorInputPort("estimated_state", 2 * n)
+            self.DeclareVectorInputPort("pressure_command", 2 * n)
+        self.DeclareVectorInputPort("estimated_state", 2 * n)
 
         rest = resting_pressure(array)
         pressure = np.concatenate([rest, rest])
@@ -217,7 +215,7 @@ class PneumaticActuation(LeafSystem):
 
     get_command_input_port = input_port(
         "`valve_opening` or `pressure_command`, whichever the mode has.",
-        index=0,
+        index=_COMMAND,
     )
     get_estimated_state_input_port = input_port("[q; q̇] (2n), rad and rad/s.")
     get_actuation_output_port = output_port("Torque on each joint (n), N m.")

@@ -259,7 +259,6 @@ class Scenario:
             self.pneumatics.mode,
             "'flow' where the valves are controlled by PIDF (Eq. 7)",
         )
-        self._check_periods(where)
         load_sound_config(self.sound)
         for i, mirror in enumerate(self.mirrors):
             mirror.check(f"{where}.mirrors[{i}]")
@@ -267,6 +266,8 @@ class Scenario:
             part: Any = getattr(self, field.name)
             if hasattr(part, "check"):
                 part.check(f"{where}.{field.name}")
+        # Last: a rate that is no number above 0 is told as such.
+        self._check_periods(where)
 
     def _check_periods(self, where: str) -> None:
         """Raises InputError for a period that is not a number of steps."""

@@ -78,6 +78,8 @@ def test_drakes_own_configs_are_read(tmp_path):
             "plant_config:\n  time_step: 0.002",
             "a divisor of the period of s.control.period, 0.005 s",
         ),
+        ("camera:\n  rate: 0.0", "s.camera.rate is 0"),
+        ("teaching:\n  update_rate: 0.0", "s.teaching.update_rate is 0"),
         ("camera:\n  rate: 30.0", "divisor of the period of s.camera.rate"),
         (
             "teaching:\n  update_rate: 300.0",
