@@ -139,13 +139,21 @@ def test_transfer_learns_the_mirror_from_three_samples():
         return np.stack([yaw, y, np.sin(2 * y + 3 * yaw), y * yaw], axis=-1)
 
     elm = ElmRegressor(
-        n_hidden=50, alpha=1e-6, input_range=[[0.0, 2.0], [-1.0, 0.5]]
+        n_hidden=50,
+        alpha=1e-6,
+        input_range=[[0.0, 2.0], [-1.0, 0.5]],
+        random_state=0,
     ).fit(tau, skill(tau))
     transfer = TransferRegressor(
-        elm, mapping, domain=[[0.0, 2.0], [-1.0, 0.5]], n_starts=8
+        elm,
+        mapping,
+        domain=[[0.0, 2.0], [-1.0, 0.5]],
+        n_starts=8,
+        random_state=0,
     ).fit(X[:3], skill(tau[:3]))
-    error = transfer.predict(X) - skill(tau)
-    assert np.abs(error).max() < 0.02
+    # The skill's own errors are the skill's; the map may add little to them.
+    error = transfer.predict(X) - elm.predict(tau)
+    assert np.abs(error).max() < 2e-3
     np.testing.assert_allclose(
         transfer.parameters_, mapping.parameters_of(MIRROR.X_WM), atol=0.02
     )
