@@ -27,6 +27,7 @@ from drake_affetto.scene.world import (
     joint_names,
     select_joints,
 )
+from drake_affetto.station.scenario import load_scenario
 
 _SLICE = 0.05
 _TRIES = 100
@@ -183,12 +184,21 @@ def run() -> None:
         add_reference_plant(DiagramBuilder(), WorldConfig())
     )
     print("CPU time a step of 1 ms; net = over the bare plant")
+    step = load_scenario("drumming").plant_config.time_step
     for names in (list(ACTIVE_JOINTS), everything):
         bare, compiled, plain = measure(names)
         print(
             f"{len(names):3d} joints: bare plant {bare:.0f} us; compiled "
             f"actuators +{compiled - bare:.1f} us ({compiled / bare:.2f} x "
             f"bare); plain numpy +{plain - bare:.1f} us ({plain / bare:.2f} x)"
+        )
+        # An update costs the same whatever its length.
+        net = (compiled - bare) * STEP / step
+        print(
+            f"           {(plain - bare) / (compiled - bare):.1f} x faster "
+            f"than numpy; at the scenarios' step of {1e3 * step:g} ms "
+            f"+{net:.1f} us a simulated ms ({net / bare:.0%} of the bare "
+            "plant's; at most 15 % is wanted)"
         )
 
 

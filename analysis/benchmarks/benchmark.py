@@ -22,6 +22,7 @@ BENCHMARKS = {
     "pneumatics": ("bench_pneumatics", "run"),
     "station": ("bench_station", "run"),
     "studies": ("bench_studies", "run"),
+    "memory": ("bench_studies", "memory"),
 }
 
 
