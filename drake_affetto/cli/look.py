@@ -70,8 +70,7 @@ def run(args: argparse.Namespace) -> int:
     out = prepare_output(args.out)
     station = AffettoStation(scenario)
     context = station.CreateDefaultContext()
-    region = scenario.drum_region
-    xy = np.array(args.drum or [np.mean(region.x), np.mean(region.y)])
+    xy = np.array(args.drum or scenario.drum_region.middle)
     station.set_drum_position(context, xy)
     station.camera.set_seed(
         station.camera.GetMyMutableContextFromRoot(context), args.seed

@@ -12,6 +12,7 @@ from drake_affetto.common.errors import InputError
 from drake_affetto.common.output import atomic_path
 from drake_affetto.common.typing import Array, Image
 from drake_affetto.experiments.episode import FRAME_PERIOD, TrialRunner
+from drake_affetto.geometry.region import grid_inside
 from drake_affetto.perception.blob import BlobCalibration
 from drake_affetto.perception.camera_model import CameraModel, Mirror
 from drake_affetto.perception.drawing import TRUTH, WORKSPACE, Canvas
@@ -88,13 +89,6 @@ class GazeGeometry:
         return image
 
 
-def region_grid(scenario: Scenario, n: int) -> Array:
-    """(n², 2) places that fill the scenario's drum region [m]."""
-    (x0, x1), (y0, y1) = scenario.drum_region.x, scenario.drum_region.y
-    x, y = np.linspace(x0, x1, n), np.linspace(y0, y1, n)
-    return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-
-
 def make_gaze_geometry(
     station: AffettoStation, context: Context
 ) -> GazeGeometry:
@@ -108,7 +102,7 @@ def make_gaze_geometry(
         mirrors_in_world(
             station.camera, station.camera.GetMyContextFromRoot(context)
         ),
-        region_grid(scenario, _CALIBRATION_GRID),
+        grid_inside(scenario.drum_region.corners, _CALIBRATION_GRID),
         scenario.look.fixed_yaw if scenario.look.mode == "fixed_yaw" else None,
     )
 
@@ -153,14 +147,13 @@ def _region_outlines(
 
     Directly, or else in the mirrors: NaN where it is not within a face.
     """
-    (x0, x1), (y0, y1) = scenario.drum_region.x, scenario.drum_region.y
+    region = scenario.drum_region
     s = np.linspace(0.0, 1.0, 20)[:, None]
-    corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]])
+    corners = [*region.corners, region.corners[0]]
     border = np.concatenate(
         [a + s * (b - a) for a, b in itertools.pairwise(corners)]
     )
-    middle = np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1)])
-    seen_in, _ = sight.model.seen_by(middle, yaw, sight.mirrors)
+    seen_in, _ = sight.model.seen_by(region.middle, yaw, sight.mirrors)
     mirror = None if seen_in is None else sight.mirrors[seen_in]
     return [sight.model.image_of(border, yaw, mirror)]
 

@@ -105,10 +105,9 @@ def write_media(
     if hit is None:
         return
     _write_sound(out / "hit.wav", hit)
-    region = direct.scenario.drum_region
-    low = np.array([region.x[0], region.y[0]])
-    high = np.array([region.x[1], region.y[1]])
-    far = np.where(np.asarray(direct.xy) > 0.5 * (low + high), low, high)
+    corners = direct.scenario.drum_region.corners
+    away = np.linalg.norm(corners - np.asarray(direct.xy), axis=1)
+    far = corners[np.argmax(away)]
     theta = direct.skill.predict(gaze.task_parameter[None, :])
     miss = trials.strike(far, np.ravel(theta), seed)
     _write_sound(out / "miss.wav", miss)

@@ -234,8 +234,9 @@ def _movements(
     )
     theta = np.array([arrays["theta"] for _, arrays in found.values()])
     # The drum's place itself is the task parameter: no image is needed.
-    region = loaded.drum_region
-    config = dataclasses.replace(loaded.skill, input_range=[region.x, region.y])
+    corners = loaded.drum_region.corners
+    box = np.stack([corners.min(axis=0), corners.max(axis=0)], axis=1)
+    config = dataclasses.replace(loaded.skill, input_range=box.tolist())
     skills = [
         make_skill(config, seed).fit(taught[:count], theta[:count])
         for count in SKILLS

@@ -42,6 +42,7 @@ from drake_affetto.experiments.results.trial import (
     pack,
     unpack,
 )
+from drake_affetto.geometry.region import spread_inside
 from drake_affetto.runner.executor import Key, Result, Spec, TrialExecutor
 from drake_affetto.skill.policy import Regressor
 from drake_affetto.sound.reward import reward_over_time
@@ -388,13 +389,6 @@ def draw_positions(
         workspace: Share of the region's length and width, about its center,
             that is used.
     """
-    from scipy.stats import qmc
-
     region = scenario.drum_region
-    corners = np.array([region.x, region.y]).T
-    center = corners.mean(axis=0)
-    low, high = center + workspace * (corners - center)
-    sampler = qmc.Sobol(2, rng=rng)
-    bits = max(1, int(np.ceil(np.log2(max(count, 2)))))
-    points = sampler.random_base2(bits)[:count]
-    return low + points * (high - low)
+    corners = region.middle + workspace * (region.corners - region.middle)
+    return spread_inside(corners, count, rng)

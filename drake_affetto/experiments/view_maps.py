@@ -17,10 +17,10 @@ from drake_affetto.common.typing import Array
 from drake_affetto.experiments.camera_preview import (
     GazeGeometry,
     make_gaze_geometry,
-    region_grid,
     turn_to,
 )
 from drake_affetto.geometry.optics import make_pose
+from drake_affetto.geometry.region import grid_inside
 from drake_affetto.perception.blob import BlobCalibration
 from drake_affetto.perception.camera_model import CameraModel
 from drake_affetto.perception.config import rotation_matrix
@@ -131,12 +131,12 @@ def places_of(view: ViewDomain, tau: Array) -> Array:
 def measure_true_map(
     view: ViewDomain, reference: ViewDomain, n: int = 9
 ) -> TrueMap:
-    """The true map over the changed view's drum region, n × n places.
+    """The true map over the changed view's drum region, a grid of n × n.
 
     The same task is the same place relative to the robot: where its base has
     moved, the reference is asked for the place that then corresponds.
     """
-    xy = region_grid(view.station.scenario, n)
+    xy = grid_inside(view.station.scenario.drum_region.corners, n)
     X_RW = reference.base_pose() @ np.linalg.inv(view.base_pose())
     in_reference = xy @ X_RW[:2, :2].T + X_RW[:2, 3]
     target = view.task_parameters(xy)

@@ -5,19 +5,31 @@ import difflib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
 from pydrake.multibody.plant import MultibodyPlantConfig
 from pydrake.systems.analysis import SimulatorConfig
 
 from drake_affetto.common.errors import (
     InputError,
     require,
+    require_array,
     require_choice,
     require_interval,
     require_range,
 )
 from drake_affetto.common.resources import models_dir
+from drake_affetto.common.typing import Array, Mask
 from drake_affetto.common.yaml_config import read_yaml, typed
 from drake_affetto.control.pidf_controller import PidfConfig
+from drake_affetto.geometry.optics import (
+    polygon_area,
+    polygon_area_centroid,
+)
+from drake_affetto.geometry.region import (
+    crosses_itself,
+    inside_polygon,
+)
 from drake_affetto.motion.dmp_config import DmpConfig
 from drake_affetto.perception.blob import BlobConfig
 from drake_affetto.perception.config import (
@@ -36,26 +48,62 @@ LONGEST_STEP = 5e-3
 """The longest step of the plant, s. Up to it outcomes are those of a step of
 0.25 ms, within the limits of docs/step_convergence.md."""
 
+# The smallest region that a drum is put into, m².
+_LEAST_REGION = 1e-4
+
 # A file names here the scenario whose values hold where it is silent.
 _EXTENDS = "extends"
 
 
 @dataclasses.dataclass
 class DrumRegion:
-    """Where trials put the drum: a box on the table, in the world frame.
+    """Where trials put the drum's center: on the table, in the world frame.
 
     Attributes:
-        x: lower and upper limit of the drum's center, m.
-        y: lower and upper limit of the drum's center, m.
+        x: lower and upper limit of a box, m.
+        y: lower and upper limit of a box, m.
+        polygon: corners [x, y] in order, m; where there are any, they are the
+            region and the box is not used.
     """
 
     x: list[float] = dataclasses.field(default_factory=lambda: [0.2, 0.27])
     y: list[float] = dataclasses.field(default_factory=lambda: [-0.15, -0.03])
+    polygon: list[list[float]] = dataclasses.field(default_factory=list)
 
     def check(self, where: str) -> None:
-        """Raises InputError unless both are intervals."""
+        """Raises InputError for what is no interval or no polygon."""
         for name in ("x", "y"):
             require_interval(f"{where}.{name}", getattr(self, name))
+        if not self.polygon:
+            return
+        where = f"{where}.polygon"
+        for i, corner in enumerate(self.polygon):
+            require_array(f"{where}[{i}]", corner, (2,))
+        require(
+            len(self.polygon) >= 3
+            and polygon_area(self.corners) > _LEAST_REGION
+            and not crosses_itself(self.corners),
+            where,
+            self.polygon,
+            "three corners or more around at least 1 cm², in order",
+        )
+
+    @property
+    def corners(self) -> Array:
+        """(k, 2), in order, m."""
+        if self.polygon:
+            return np.array(self.polygon, dtype=float)
+        (x0, x1), (y0, y1) = self.x, self.y
+        return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+
+    @property
+    def middle(self) -> Array:
+        """Center of its area (2,), m."""
+        return polygon_area_centroid(self.corners)[1]
+
+    def contains(self, xy: ArrayLike) -> Mask:
+        """Whether places (..., 2), m, are in the region or on its border."""
+        return inside_polygon(self.corners, xy)
 
 
 @dataclasses.dataclass
@@ -266,6 +314,12 @@ class Scenario:
             part: Any = getattr(self, field.name)
             if hasattr(part, "check"):
                 part.check(f"{where}.{field.name}")
+        require(
+            bool(self.drum_region.contains(self.world.drum_position)),
+            f"{where}.world.drum_position",
+            self.world.drum_position,
+            f"a place in {where}.drum_region",
+        )
         # Last: a rate that is no number above 0 is told as such.
         self._check_periods(where)
 

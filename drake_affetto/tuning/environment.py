@@ -136,8 +136,9 @@ class TrackingEnvironment:
         station_context = station.GetMyMutableContextFromRoot(context)
         station.reset(station_context)
         # The drum stands where no reference moves the hand.
-        region = station.scenario.drum_region
-        station.set_drum_position(station_context, [region.x[1], region.y[1]])
+        corners = station.scenario.drum_region.corners
+        farthest = corners[np.argmax(corners.sum(axis=1))]
+        station.set_drum_position(station_context, farthest)
         # Equilibrium: the integrators hold the start posture.
         controller = station.GetMutableSubsystemContext(
             station.controller, station_context

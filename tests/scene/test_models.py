@@ -18,7 +18,7 @@ from drake_affetto.scene import world
 
 # name, lower, upper [deg], length to the next joint [m], mass [kg], class
 TRUNK = [
-    ("waist_yaw", -30, 30, 0.02, 0.15, "W"),
+    ("waist_yaw", -45, 45, 0.02, 0.15, "W"),
     ("waist_pitch", -15, 40, 0.03, 0.20, "W"),
     ("waist_roll", -20, 20, 0.05, 0.35, "W"),
     ("lumbar_pitch", -15, 25, 0.06, 0.40, "W"),

@@ -97,7 +97,7 @@ def test_postures_are_set_and_read_back(scene):
     ("posture", "told"),
     [
         ({"waist_jaw": 0.1}, "no joint 'waist_jaw'; did you mean waist_yaw"),
-        ({"waist_yaw": 0.6}, r"posture\.waist_yaw is 0\.6.*-0\.52.* to 0\.52"),
+        ({"waist_yaw": 0.9}, r"posture\.waist_yaw is 0\.9.*-0\.78.* to 0\.78"),
         ({"waist_yaw": float("nan")}, r"posture\.waist_yaw is nan"),
     ],
 )
