@@ -4,12 +4,13 @@ python analysis/experiments/workspace.py [--out out/workspace.png] [--step 0.01]
 """
 
 import argparse
+import dataclasses
 from pathlib import Path
 
 import matplotlib
 
 matplotlib.use("Agg")
-from matplotlib.patches import Circle, Ellipse, Patch, Rectangle
+from matplotlib.patches import Circle, Ellipse, Patch, Polygon, Rectangle
 import matplotlib.pyplot as plt
 import numpy as np
 from pydrake.multibody.plant import AddMultibodyPlant
@@ -19,10 +20,11 @@ from drake_affetto.experiments.workspace import (
     Workspace,
     WorkspaceConfig,
     compute_workspace,
-    largest_box,
+    usable_polygon,
 )
+from drake_affetto.geometry.optics import polygon_area
 from drake_affetto.scene import world
-from drake_affetto.station.scenario import Scenario, load_scenario
+from drake_affetto.station.scenario import DrumRegion, Scenario, load_scenario
 
 _REGIONS = (
     ("reach", "the hand strikes it from above", "#1f77b4"),
@@ -54,7 +56,7 @@ def draw(
     plant,
     context,
     workspace: Workspace,
-    region: tuple[np.ndarray, np.ndarray],
+    region: DrumRegion,
     path: Path,
 ) -> None:
     """Draws the scene from above, x (forward) up and y (left) to the left."""
@@ -86,12 +88,9 @@ def draw(
         handles.append(
             Patch(facecolor="none", edgecolor=color, lw=2, label=label)
         )
-    lower, upper = region
     ax.add_patch(
-        Rectangle(
-            (lower[1], lower[0]),
-            upper[1] - lower[1],
-            upper[0] - lower[0],
+        Polygon(
+            region.corners[:, ::-1],
             fill=False,
             edgecolor="k",
             linestyle="--",
@@ -106,7 +105,7 @@ def draw(
             label="where trials put it",
         )
     )
-    center = 0.5 * (lower + upper)
+    center = region.middle
     ax.add_patch(
         Circle(
             center[::-1],
@@ -171,11 +170,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("out/workspace.png"))
     parser.add_argument("--step", type=float, default=0.01, help="grid [m]")
+    parser.add_argument(
+        "--margin", type=float, default=0.015, help="off the limits [m]"
+    )
     args = parser.parse_args()
     direct, mirror = load_scenario("drumming"), load_scenario("mirror")
+    # The direct view's scene, but with the mirror in its place.
+    scene = dataclasses.replace(direct.world, frames=mirror.world.frames)
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlant(direct.plant_config, builder)
-    world.add_world(plant, direct.world)
+    world.add_world(plant, scene)
     plant.Finalize()
     root = builder.Build().CreateDefaultContext()
     context = plant.GetMyMutableContextFromRoot(root)
@@ -188,18 +192,18 @@ def main() -> None:
     print(f"usable: {usable.sum() * (1e2 * args.step) ** 2:.0f} cm² of table")
     print(f"yaw that centers the marker: {yaw.min():.1f} .. {yaw.max():.1f}°")
     print(f"marker in the mirror: {area.min():.0f} .. {area.max():.0f} px²")
-    for what, margin in (("largest box", 0.0), ("with 1 cm to spare", 0.01)):
-        low, high = largest_box(result.x, result.y, usable, margin)
-        print(
-            f"{what}: x {low[0]:.3f} .. {high[0]:.3f}, "
-            f"y {low[1]:.3f} .. {high[1]:.3f} m"
-        )
-    region = np.array([direct.drum_region.x, direct.drum_region.y]).T
-    in_x = (result.x >= region[0, 0]) & (result.x <= region[1, 0])
-    in_y = (result.y >= region[0, 1]) & (result.y <= region[1, 1])
-    inside = usable[np.ix_(in_x, in_y)].all()
-    print(f"the scenario's region is {'' if inside else 'NOT '}inside")
-    draw(plant, context, result, (region[0], region[1]), args.out)
+    corners = usable_polygon(result.x, result.y, usable, args.margin)
+    print(
+        f"with {1e2 * args.margin:g} cm to spare: "
+        f"{1e4 * polygon_area(corners):.0f} cm², corners"
+    )
+    for corner in corners:
+        print(f"- [{corner[0]:.3f}, {corner[1]:.3f}]")
+    region = direct.drum_region
+    print(
+        f"the scenario's region: {1e4 * polygon_area(region.corners):.0f} cm²"
+    )
+    draw(plant, context, result, region, args.out)
     print(args.out)
 
 

@@ -9,6 +9,7 @@ it see the marker in the mirror from a fixed yaw.
 from collections.abc import Mapping
 import dataclasses
 
+import cv2
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
@@ -123,8 +124,8 @@ class Workspace:
         reach: (nx, ny), the hand can strike the head from above, starting
             from the direct posture turned to the drum.
         reach_mirror: the same, starting from the mirror posture.
-        sees: the whole marker is in the image, before and after the upper
-            body has turned to it; then the mirror is out of the image.
+        sees: the whole marker is in the image once the upper body has turned
+            to it; a gaze that searches finds it from anywhere.
         sees_mirror: the whole marker is in the mirror's image, large enough.
         yaw: (nx, ny) yaw [rad] that centers the marker; NaN if none does.
         pixels: (nx, ny, 2) the marker's center in the image, once centered.
@@ -150,14 +151,6 @@ class Workspace:
     def usable(self) -> Mask:
         """(nx, ny), where direct and mirrored drumming are both possible."""
         return self.reach & self.reach_mirror & self.sees & self.sees_mirror
-
-
-def _panel(X_WM: Array, size: Array, frame: float = 0.015) -> Array:
-    """Points (k, 3) in world all over a mirror and its frame."""
-    half = 0.5 * size + frame
-    u, v = np.meshgrid(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21))
-    flat = np.stack([half[0] * u, half[1] * v, 0 * u], axis=-1).reshape(-1, 3)
-    return flat @ X_WM[:3, :3].T + X_WM[:3, 3]
 
 
 def _collides(plant: MultibodyPlant, context: Context) -> bool:
@@ -281,12 +274,8 @@ def _see(
         yaw[(yaw < model.yaw_min) | (yaw > model.yaw_max)] = np.nan
         in_range = (yaw > model.yaw_min + gap) & (yaw < model.yaw_max - gap)
     X_WC = np.stack([model.camera_pose(each) for each in np.nan_to_num(yaw)])
-    start = model.camera_pose(direct[config.yaw_joint])
-    sees = (
-        in_range
-        & camera.inside(project(X_WC, rim), config.edge).all(axis=-1)
-        & camera.inside(project(start, rim)).all(axis=-1)
-        & ~camera.inside(project(X_WC, _panel(X_WM, size))).any(axis=-1)
+    sees = in_range & camera.inside(project(X_WC, rim), config.edge).all(
+        axis=-1
     )
     # In the mirror, from the posture that faces it.
     facing_eye = eye.pose(eye.posture(facing))
@@ -392,37 +381,36 @@ def _reach(
     return reach, struck[0]
 
 
-def largest_box(
-    x: Array, y: Array, mask: Mask, margin: float = 0.0
-) -> tuple[Array, Array]:
-    """The largest box, by area, of which every grid point is in `mask`.
+def usable_polygon(
+    x: Array, y: Array, mask: Mask, margin: float, tolerance: float = 0.008
+) -> Array:
+    """A polygon around the largest part of a mask, a margin inside its border.
 
     Args:
-        x: (nx,) grid.
-        y: (ny,) grid.
+        x: (nx,) grid, even [m].
+        y: (ny,) grid, as even as x [m].
         mask: (nx, ny).
-        margin: taken off on all four sides [m].
+        margin: least distance of the polygon from where the mask ends [m].
+        tolerance: how far a corner may be cut [m], inwards or outwards; the
+            margin is kept all the same.
 
     Returns:
-        Lower and upper corner, (2,) each; both NaN where there is none.
+        Corners (k, 2) in order [m]; none where nothing is left.
     """
-    best = (0.0, 0, 0, 0, 0)
-    filled = np.zeros(len(y), dtype=int)
-    for i in range(len(x)):
-        filled = np.where(mask[i], filled + 1, 0)
-        for j in range(len(y)):
-            depth = filled[j]
-            for k in range(j, -1, -1):
-                depth = min(depth, filled[k])
-                if depth == 0:
-                    break
-                first = i - depth + 1
-                size = (x[i] - x[first]) * (y[j] - y[k])
-                if size > best[0]:
-                    best = (size, first, i, k, j)
-    size, i0, i1, j0, j1 = best
-    lower = np.array([x[i0], y[j0]]) + margin
-    upper = np.array([x[i1], y[j1]]) - margin
-    if size == 0 or np.any(upper <= lower):
-        return np.full(2, np.nan), np.full(2, np.nan)
-    return lower, upper
+    fine = 10
+    step = (x[1] - x[0]) / fine
+    # Each place of the grid stands for a square; one more all around is empty.
+    squares = np.pad(mask, 1).astype(np.uint8)
+    image = np.kron(squares, np.ones((fine, fine), np.uint8))
+    distance = cv2.distanceTransform(image, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    kept = (distance * step >= margin + tolerance).astype(np.uint8)
+    outlines, _ = cv2.findContours(
+        kept, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
+    )
+    if not outlines:
+        return np.zeros((0, 2))
+    largest = max(outlines, key=cv2.contourArea)
+    corners = cv2.approxPolyDP(largest, tolerance / step, closed=True)[:, 0]
+    # Columns of the image run along y.
+    place = (corners[:, ::-1] - 1.5 * fine + 0.5) * step
+    return np.asarray(place + [x[0], y[0]])
