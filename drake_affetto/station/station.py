@@ -20,7 +20,6 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 from pydrake.systems.primitives import (
-    Adder,
     ConstantVectorSource,
     MatrixGain,
     PassThrough,
@@ -39,8 +38,10 @@ from drake_affetto.perception.gaze_servo import GazeServo, gaze_view
 from drake_affetto.perception.mirror_camera import MirrorCamera
 from drake_affetto.pneumatics.actuation import PneumaticActuation
 from drake_affetto.scene import world
+from drake_affetto.sensing.joint_sensors import JointSensors
 from drake_affetto.skill.policy import SkillPolicy
 from drake_affetto.sound.microphone import DrumMicrophone
+from drake_affetto.station.gaze_turn import add_gaze_turn
 from drake_affetto.station.joint_state import make_joint_state
 from drake_affetto.station.scenario import Scenario
 from drake_affetto.teaching.kinesthetic_teacher import KinestheticTeacher
@@ -68,6 +69,7 @@ class AffettoStation(Diagram):
         - affetto.valve_opening (valve_source external, flow mode)
         - affetto.pressure_command (valve_source external, regulator mode)
         output_ports:
+        - affetto.joint_state
         - affetto.estimated_state
         - affetto.desired_state
         - affetto.valve_opening
@@ -89,12 +91,13 @@ class AffettoStation(Diagram):
 
     With n active joints, in the scenario's order:
 
-    - affetto.estimated_state, affetto.desired_state (2n): rad, rad/s, both at
-      the same time (see `joint_state`).
+    - affetto.joint_state, affetto.desired_state (2n): rad, rad/s, both at the
+      same time (see `joint_state`).
+    - affetto.estimated_state (2n): the same as the robot's sensors have it.
     - affetto.valve_opening (n): v⁺ in [-1, 1].
     - affetto.pid_output (n): u_PID, Pa.
     - affetto.actuation (n): N m.
-    - affetto.chamber_pressure (2n): [p_a; p_b], Pa absolute.
+    - affetto.chamber_pressure (2n): [p_a; p_b] as read, Pa absolute.
     - affetto.mass_flow (2n): into the chambers, kg/s.
     - affetto.policy_parameters (n·K): θ, rad/s².
     - affetto.start_time (1): when θ is played, s.
@@ -159,9 +162,10 @@ class AffettoStation(Diagram):
                 for name in self.joints.names
             ]
         )
-        self._estimated_state = self._add_estimation(builder)
+        self._true_state = self._add_joint_state(builder)
         self._add_teacher(builder, meshcat if by_mouse else None)
         self._add_actuation(builder)
+        self._estimated_state, self._pressure = self._add_sensors(builder)
         self._add_sight(builder)
         self._add_hearing(builder)
         desired = self._add_motion(builder)
@@ -212,6 +216,8 @@ class AffettoStation(Diagram):
         mine = self._mine(context)
         self.SetDefaultContext(mine)
         self._balance_gravity(context)
+        self.set_seed(context, self.scenario.random_seed)
+        self._reset_sensors(context)
         if self.scenario.motion_source == "skill":
             look = self.scenario.look
             self.gaze.set_task(
@@ -290,6 +296,24 @@ class AffettoStation(Diagram):
         self._joint_state.SetDefaultContext(
             self._sub(self._joint_state, context)
         )
+        self._reset_sensors(context)
+
+    def set_seed(self, context: Context, seed: int) -> None:
+        """Sets the seed of all that differs from trial to trial."""
+        self.camera.set_seed(self._sub(self.camera, context), seed)
+        if self.sensors is not None:
+            self.sensors.set_seed(self._sub(self.sensors, context), seed)
+
+    def _reset_sensors(self, context: Context) -> None:
+        """Lets the sensors read a robot that has just been put at rest."""
+        if self.sensors is not None:
+            self.sensors.reset(
+                self._sub(self.sensors, context),
+                self._true_state.Eval(self._sub(self._joint_state, context)),
+                self.actuation.get_chamber_pressure_output_port().Eval(
+                    self._sub(self.actuation, context)
+                ),
+            )
 
     def _mine(self, context: Context) -> Context:
         """The station's context, from itself or from the root's."""
@@ -303,7 +327,7 @@ class AffettoStation(Diagram):
         """The system's context, from the station's or from the root's."""
         return self.GetMutableSubsystemContext(system, self._mine(context))
 
-    def _add_estimation(self, builder: DiagramBuilder) -> OutputPort:
+    def _add_joint_state(self, builder: DiagramBuilder) -> OutputPort:
         self._joint_state = builder.AddNamedSystem(
             "joint_state",
             make_joint_state(self.joints, self.scenario.plant_config.time_step),
@@ -312,9 +336,36 @@ class AffettoStation(Diagram):
             self.plant.get_state_output_port(self._robot),
             self._joint_state.get_input_port(),
         )
-        estimated = self._joint_state.get_output_port()
-        builder.ExportOutput(estimated, "affetto.estimated_state")
-        return estimated
+        state = self._joint_state.get_output_port()
+        builder.ExportOutput(state, "affetto.joint_state")
+        return state
+
+    def _add_sensors(
+        self, builder: DiagramBuilder
+    ) -> tuple[OutputPort, OutputPort]:
+        """Adds sensors, if any; returns [q; q̇] and [p_a; p_b] as read."""
+        self.sensors: JointSensors | None = None
+        state = self._true_state
+        pressure = self.actuation.get_chamber_pressure_output_port()
+        if self.scenario.variation.enabled:
+            self.sensors = JointSensors.AddToBuilder(
+                builder=builder,
+                joint_state=state,
+                true_pressure=pressure,
+                parameters=self.scenario.variation.load().sensors,
+                joint_names=self.joints.names,
+                q_lower=self._q_limits[0],
+                q_upper=self._q_limits[1],
+                period=self.scenario.control.period,
+                # With the actuators' update: the joints are by then those of
+                # the tick, the pressures those of one step before.
+                lead=0.5 * self.scenario.plant_config.time_step,
+            )
+            state = self.sensors.get_estimated_state_output_port()
+            pressure = self.sensors.get_chamber_pressure_output_port()
+        builder.ExportOutput(state, "affetto.estimated_state")
+        builder.ExportOutput(pressure, "affetto.chamber_pressure")
+        return state, pressure
 
     def _add_teacher(
         self, builder: DiagramBuilder, mouse: Meshcat | None
@@ -337,25 +388,25 @@ class AffettoStation(Diagram):
                 config=teaching,
             )
             builder.Connect(
-                self._estimated_state,
+                self._true_state,
                 self.teacher.get_estimated_state_input_port(),
             )
             pull = self.teacher.get_pulling_force_output_port()
         builder.ExportOutput(pull, "teacher.pulling_force")
 
     def _add_actuation(self, builder: DiagramBuilder) -> None:
-        lower, upper = world.joint_limits(self.plant, self.joints.names)
+        self._q_limits = world.joint_limits(self.plant, self.joints.names)
         config = self.scenario.pneumatics
         config.time_step = self.scenario.plant_config.time_step
         self.actuation = PneumaticActuation.AddToBuilder(
             builder=builder,
             config=config,
             joint_names=self.joints.names,
-            q_lower=lower,
-            q_upper=upper,
+            q_lower=self._q_limits[0],
+            q_upper=self._q_limits[1],
         )
         builder.Connect(
-            self._estimated_state,
+            self._true_state,
             self.actuation.get_estimated_state_input_port(),
         )
         spread = builder.AddNamedSystem(
@@ -373,7 +424,6 @@ class AffettoStation(Diagram):
             builder,
             "affetto",
             self.actuation.get_actuation_output_port(),
-            self.actuation.get_chamber_pressure_output_port(),
             self.actuation.get_mass_flow_output_port(),
         )
 
@@ -487,34 +537,13 @@ class AffettoStation(Diagram):
             self.gaze.get_task_parameter_output_port(),
             self.gaze.get_settled_output_port(),
         )
-        return self._add_gaze_turn(
-            builder, self.dmp_source.get_desired_state_output_port()
+        return add_gaze_turn(
+            builder,
+            self.dmp_source.get_desired_state_output_port(),
+            self.gaze.get_yaw_command_output_port(),
+            self._yaw,
+            self.start_posture[self._yaw],
         )
-
-    def _add_gaze_turn(
-        self, builder: DiagramBuilder, movement: OutputPort
-    ) -> OutputPort:
-        """Adds the gaze's turn to the movement; returns [q; q̇] desired.
-
-        The gaze turns the yaw away from the movement's yaw. It returns when
-        it is done, so that only the movement is left.
-        """
-        n = self.num_joints
-        turn = np.zeros((2 * n, 1))
-        turn[self._yaw] = 1.0
-        spread = builder.AddNamedSystem("gaze_turn", MatrixGain(D=turn))
-        straight = builder.AddNamedSystem(
-            "gaze_straight",
-            ConstantVectorSource(-turn[:, 0] * self.start_posture[self._yaw]),
-        )
-        total = builder.AddNamedSystem("desired_state", Adder(3, 2 * n))
-        builder.Connect(
-            self.gaze.get_yaw_command_output_port(), spread.get_input_port()
-        )
-        builder.Connect(movement, total.get_input_port(0))
-        builder.Connect(spread.get_output_port(), total.get_input_port(1))
-        builder.Connect(straight.get_output_port(), total.get_input_port(2))
-        return total.get_output_port()
 
     def _add_control(
         self, builder: DiagramBuilder, desired: OutputPort
@@ -538,7 +567,9 @@ class AffettoStation(Diagram):
             self._estimated_state,
             self.controller.get_estimated_state_input_port(),
         )
-        connect(builder, self.actuation, self.controller, "chamber_pressure")
+        builder.Connect(
+            self._pressure, self.controller.get_chamber_pressure_input_port()
+        )
         builder.Connect(
             self._offset.get_output_port(),
             self.controller.get_equilibrium_offset_input_port(),
