@@ -68,7 +68,9 @@ class Recording:
             its center, m (T, 2).
         knock_force: Forces on the shell and on the table (T, 2), N.
         joint_t: Times of the joints (S,), s.
-        joint_state: Angles and speeds (S, 2n), rad, rad/s.
+        joint_state: Angles and speeds (S, 2n) as the robot's sensors have
+            them, rad, rad/s.
+        true_state: The same as they are, for judging only.
         desired_state: Desired angles and speeds (S, 2n), rad, rad/s.
         chamber_pressure: Absolute pressures (S, 2n), Pa.
         sound: Sound pressure at the microphone (samples,), Pa.
@@ -80,6 +82,7 @@ class Recording:
     knock_force: Array
     joint_t: Array
     joint_state: Array
+    true_state: Array
     desired_state: Array
     chamber_pressure: Array
     sound: Array
@@ -140,6 +143,7 @@ class TrialRunner:
             "drum.contact_force": step,
             "drum.knock_force": step,
             "affetto.mass_flow": step,
+            "affetto.joint_state": 1.0 / scenario.teaching.recording_rate,
             "affetto.estimated_state": 1.0 / scenario.teaching.recording_rate,
             "affetto.desired_state": 1.0 / scenario.teaching.recording_rate,
             "affetto.chamber_pressure": 1.0 / scenario.teaching.recording_rate,
@@ -426,6 +430,7 @@ class TrialRunner:
             knock_force=knock,
             joint_t=joint_t - start,
             joint_state=state,
+            true_state=self._log("affetto.joint_state")[1],
             desired_state=self._log("affetto.desired_state")[1],
             chamber_pressure=self._log("affetto.chamber_pressure")[1],
             sound=sound,

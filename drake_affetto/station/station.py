@@ -20,7 +20,6 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 from pydrake.systems.primitives import (
-    ConstantVectorSource,
     MatrixGain,
     PassThrough,
 )
@@ -28,6 +27,7 @@ from pydrake.systems.sensors import CameraInfo
 
 from drake_affetto.common.errors import require
 from drake_affetto.common.systems import connect
+from drake_affetto.control.gravity_feedforward import GravityFeedforward
 from drake_affetto.control.pidf_controller import PidfController
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.motion.dmp_source import DmpSource
@@ -37,6 +37,8 @@ from drake_affetto.perception.gaze import GazeMode, GazeTask
 from drake_affetto.perception.gaze_servo import GazeServo, gaze_view
 from drake_affetto.perception.mirror_camera import MirrorCamera
 from drake_affetto.pneumatics.actuation import PneumaticActuation
+from drake_affetto.pneumatics.chamber import Row
+from drake_affetto.pneumatics.parameters import resting_pressure
 from drake_affetto.scene import world
 from drake_affetto.sensing.joint_sensors import JointSensors
 from drake_affetto.skill.policy import SkillPolicy
@@ -44,6 +46,7 @@ from drake_affetto.sound.microphone import DrumMicrophone
 from drake_affetto.station.gaze_turn import add_gaze_turn
 from drake_affetto.station.joint_state import make_joint_state
 from drake_affetto.station.scenario import Scenario
+from drake_affetto.station.variation import VariationParameters
 from drake_affetto.teaching.kinesthetic_teacher import KinestheticTeacher
 from drake_affetto.teaching.mouse_teacher import MouseTeacher
 
@@ -144,6 +147,11 @@ class AffettoStation(Diagram):
             "False without a meshcat",
         )
         self.scenario = scenario
+        self._variation = (
+            scenario.variation.load()
+            if scenario.variation.enabled
+            else VariationParameters()
+        )
         builder = DiagramBuilder()
         self.plant: MultibodyPlant
         self.scene_graph: SceneGraph
@@ -247,7 +255,10 @@ class AffettoStation(Diagram):
         if self.scenario.valve_source == "pidf":
             controller = self._sub(self.controller, context)
             self.controller.reset(controller, p_a - p_b)
-            self.controller.set_integral(controller, p_a - p_b)
+            known = self._gravity.reset(
+                self._sub(self._gravity, context), self.start_posture
+            )
+            self.controller.set_integral(controller, p_a - p_b - known)
 
     def set_drum_position(self, context: Context, xy: ArrayLike) -> None:
         """Puts the drum at xy (2,), m, on the table in the world frame.
@@ -303,6 +314,11 @@ class AffettoStation(Diagram):
         self.camera.set_seed(self._sub(self.camera, context), seed)
         if self.sensors is not None:
             self.sensors.set_seed(self._sub(self.sensors, context), seed)
+            self.actuation.vary(
+                self._sub(self.actuation, context),
+                self._variation.actuators,
+                seed,
+            )
 
     def _reset_sensors(self, context: Context) -> None:
         """Lets the sensors read a robot that has just been put at rest."""
@@ -352,7 +368,7 @@ class AffettoStation(Diagram):
                 builder=builder,
                 joint_state=state,
                 true_pressure=pressure,
-                parameters=self.scenario.variation.load().sensors,
+                parameters=self._variation.sensors,
                 joint_names=self.joints.names,
                 q_lower=self._q_limits[0],
                 q_upper=self._q_limits[1],
@@ -404,6 +420,7 @@ class AffettoStation(Diagram):
             joint_names=self.joints.names,
             q_lower=self._q_limits[0],
             q_upper=self._q_limits[1],
+            longest_delay=self._variation.actuators.longest_delay,
         )
         builder.Connect(
             self._true_state,
@@ -558,10 +575,18 @@ class AffettoStation(Diagram):
             config=self.scenario.control,
             joint_names=self.joints.names,
         )
-        self._offset = builder.AddNamedSystem(
-            "equilibrium_offset",
-            ConstantVectorSource(np.zeros(self.num_joints)),
+        array = self.actuation.parameters
+        self._gravity = builder.AddNamedSystem(
+            "gravity_feedforward",
+            GravityFeedforward(
+                self.plant,
+                self.joints.names,
+                array[[Row.K_A, Row.K_B]],
+                resting_pressure(array) - array[Row.ATMOSPHERE],
+                share=self.scenario.control.gravity_share,
+            ),
         )
+        builder.Connect(desired, self._gravity.get_desired_state_input_port())
         builder.Connect(desired, self.controller.get_desired_state_input_port())
         builder.Connect(
             self._estimated_state,
@@ -570,9 +595,8 @@ class AffettoStation(Diagram):
         builder.Connect(
             self._pressure, self.controller.get_chamber_pressure_input_port()
         )
-        builder.Connect(
-            self._offset.get_output_port(),
-            self.controller.get_equilibrium_offset_input_port(),
+        connect(
+            builder, self._gravity, self.controller, "equilibrium_offset"
         )
         builder.Connect(
             self.controller.get_valve_opening_output_port(), command
@@ -587,11 +611,11 @@ class AffettoStation(Diagram):
     def set_equilibrium_offset(
         self, context: Context, offset: Sequence[float] | np.ndarray
     ) -> None:
-        """Sets the offset (n,), Pa, that is added to u_PID (paper Eq. 8)."""
-        value = self._offset.get_mutable_source_value(
-            self._sub(self._offset, context)
-        )
-        value.SetFromVector(np.asarray(offset, float))
+        """Sets the offset (n,), Pa, that is added to u_PID (paper Eq. 8).
+
+        It takes the place of the gravity that the controller compensates.
+        """
+        self._gravity.set_constant(self._sub(self._gravity, context), offset)
 
 
 def _export(builder: DiagramBuilder, part: str, *ports: OutputPort) -> None:

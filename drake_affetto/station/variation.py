@@ -3,6 +3,7 @@
 import dataclasses
 
 from drake_affetto.common.yaml_config import load_config
+from drake_affetto.pneumatics.variation import ActuatorVariation
 from drake_affetto.sensing.readings import SensorParameters
 
 DEFAULT_FILE = "package://drake_affetto/variation.yaml"
@@ -13,15 +14,20 @@ class VariationParameters:
     """How the robot departs from its model.
 
     Attributes:
+        actuators: Friction, valves and air supply, drawn once a trial.
         sensors: Resolution and noise of its sensors, and their filter.
     """
 
+    actuators: ActuatorVariation = dataclasses.field(
+        default_factory=ActuatorVariation
+    )
     sensors: SensorParameters = dataclasses.field(
         default_factory=SensorParameters
     )
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that does not fit."""
+        self.actuators.check(f"{where}.actuators")
         self.sensors.check(f"{where}.sensors")
 
 
