@@ -1,12 +1,11 @@
 """What holds the desired posture against gravity, as an offset of the demand.
 
-A pressure difference Δp at the mean pressure p_m (gauge) gives the torque
-
-    τ = (K_a + K_b) Δp/2 + (K_a - K_b) p_m,
-
-so that Δp = 2 (τ_g(q_des) - (K_a - K_b) p_m)/(K_a + K_b) holds the posture
-without any error of the angles.
+A joint's torque is linear in the pressure difference of its chambers, so that
+the difference Δp = slope τ_g(q_des) + offset holds it without an error of the
+angle.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +17,7 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
-from drake_affetto.common.errors import require, require_range
+from drake_affetto.common.errors import require_array, require_range
 from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.common.typing import Array
 
@@ -44,9 +43,9 @@ class GravityFeedforward(LeafSystem):
     def __init__(
         self,
         plant: MultibodyPlant,
-        joint_names: list[str],
-        torque_constants: ArrayLike,
-        mean_pressure: ArrayLike,
+        joint_names: Sequence[str],
+        slope: ArrayLike,
+        offset: ArrayLike,
         *,
         share: float = 1.0,
         period: float = 0.02,
@@ -56,8 +55,8 @@ class GravityFeedforward(LeafSystem):
         Args:
             plant: Finalized plant of the robot.
             joint_names: Names of the n joints of the ports.
-            torque_constants: K_a and K_b, rows of (2, n), N m/Pa.
-            mean_pressure: Mean pressure of each joint (n,), Pa gauge.
+            slope: Pressure difference per torque (n,), Pa/(N m).
+            offset: Pressure difference without a torque (n,), Pa.
             share: Share of gravity that is compensated.
             period: Time between two updates, s.
 
@@ -67,11 +66,9 @@ class GravityFeedforward(LeafSystem):
         super().__init__()
         require_range("share", share, 0.0, 1.0)
         require_range("period", period, 1e-4, 1.0)
-        K_a, K_b = np.asarray(torque_constants, float)
         self._n = n = len(joint_names)
-        require(K_a.size == n, "torque_constants", K_a.size, f"those of {n}")
-        self._slope = 2.0 / (K_a + K_b)
-        self._bias = -self._slope * (K_a - K_b) * np.asarray(mean_pressure)
+        self._slope = require_array("slope", slope, (n,), positive=True)
+        self._bias = require_array("offset", offset, (n,))
         self._plant = plant
         self._plant_context = plant.CreateDefaultContext()
         joints = [plant.GetJointByName(name) for name in joint_names]

@@ -60,7 +60,10 @@ def measure_repeatability(
             [best_lag(t, desired[:, j], q[:, :, j]) for j in range(n)]
         ),
         lowest=np.array(
-            [palm_path(trials, each.true_state)[:, 2].min() for each in recordings]
+            [
+                palm_path(trials, each.true_state)[:, 2].min()
+                for each in recordings
+            ]
         ),
     )
 

@@ -119,8 +119,7 @@ class JointSensors(LeafSystem):
         true_pressure: OutputPort,
         parameters: SensorParameters,
         joint_names: Sequence[str],
-        q_lower: ArrayLike,
-        q_upper: ArrayLike,
+        limits: tuple[ArrayLike, ArrayLike],
         period: float = 0.005,
         lead: float = 0.0,
         name: str = "joint_sensors",
@@ -133,10 +132,11 @@ class JointSensors(LeafSystem):
             builder: Builder of the Diagram.
             joint_state: [q; q̇] (2n) of the plant, rad and rad/s.
             true_pressure: [p_a; p_b] (2n) of the chambers, Pa.
+            limits: q_lower and q_upper.
             name: Name of the system.
         """
         sensors = JointSensors(
-            parameters, joint_names, q_lower, q_upper, period=period, lead=lead
+            parameters, joint_names, *limits, period=period, lead=lead
         )
         builder.AddNamedSystem(name, sensors)
         builder.Connect(joint_state, sensors.get_joint_state_input_port())

@@ -37,8 +37,7 @@ from drake_affetto.perception.gaze import GazeMode, GazeTask
 from drake_affetto.perception.gaze_servo import GazeServo, gaze_view
 from drake_affetto.perception.mirror_camera import MirrorCamera
 from drake_affetto.pneumatics.actuation import PneumaticActuation
-from drake_affetto.pneumatics.chamber import Row
-from drake_affetto.pneumatics.parameters import resting_pressure
+from drake_affetto.pneumatics.parameters import pressure_differences
 from drake_affetto.scene import world
 from drake_affetto.sensing.joint_sensors import JointSensors
 from drake_affetto.skill.policy import SkillPolicy
@@ -46,7 +45,6 @@ from drake_affetto.sound.microphone import DrumMicrophone
 from drake_affetto.station.gaze_turn import add_gaze_turn
 from drake_affetto.station.joint_state import make_joint_state
 from drake_affetto.station.scenario import Scenario
-from drake_affetto.station.variation import VariationParameters
 from drake_affetto.teaching.kinesthetic_teacher import KinestheticTeacher
 from drake_affetto.teaching.mouse_teacher import MouseTeacher
 
@@ -147,11 +145,7 @@ class AffettoStation(Diagram):
             "False without a meshcat",
         )
         self.scenario = scenario
-        self._variation = (
-            scenario.variation.load()
-            if scenario.variation.enabled
-            else VariationParameters()
-        )
+        self._variation = scenario.variation.load()
         builder = DiagramBuilder()
         self.plant: MultibodyPlant
         self.scene_graph: SceneGraph
@@ -173,7 +167,7 @@ class AffettoStation(Diagram):
         self._true_state = self._add_joint_state(builder)
         self._add_teacher(builder, meshcat if by_mouse else None)
         self._add_actuation(builder)
-        self._estimated_state, self._pressure = self._add_sensors(builder)
+        self.sensors = self._add_sensors(builder)
         self._add_sight(builder)
         self._add_hearing(builder)
         desired = self._add_motion(builder)
@@ -356,32 +350,29 @@ class AffettoStation(Diagram):
         builder.ExportOutput(state, "affetto.joint_state")
         return state
 
-    def _add_sensors(
-        self, builder: DiagramBuilder
-    ) -> tuple[OutputPort, OutputPort]:
-        """Adds sensors, if any; returns [q; q̇] and [p_a; p_b] as read."""
-        self.sensors: JointSensors | None = None
-        state = self._true_state
-        pressure = self.actuation.get_chamber_pressure_output_port()
+    def _add_sensors(self, builder: DiagramBuilder) -> JointSensors | None:
+        """Adds the sensors of a robot that varies."""
+        self._estimated_state = self._true_state
+        self._pressure = self.actuation.get_chamber_pressure_output_port()
+        sensors = None
         if self.scenario.variation.enabled:
-            self.sensors = JointSensors.AddToBuilder(
+            sensors = JointSensors.AddToBuilder(
                 builder=builder,
-                joint_state=state,
-                true_pressure=pressure,
+                joint_state=self._true_state,
+                true_pressure=self._pressure,
                 parameters=self._variation.sensors,
                 joint_names=self.joints.names,
-                q_lower=self._q_limits[0],
-                q_upper=self._q_limits[1],
+                limits=self._q_limits,
                 period=self.scenario.control.period,
                 # With the actuators' update: the joints are by then those of
                 # the tick, the pressures those of one step before.
                 lead=0.5 * self.scenario.plant_config.time_step,
             )
-            state = self.sensors.get_estimated_state_output_port()
-            pressure = self.sensors.get_chamber_pressure_output_port()
-        builder.ExportOutput(state, "affetto.estimated_state")
-        builder.ExportOutput(pressure, "affetto.chamber_pressure")
-        return state, pressure
+            self._estimated_state = sensors.get_estimated_state_output_port()
+            self._pressure = sensors.get_chamber_pressure_output_port()
+        builder.ExportOutput(self._estimated_state, "affetto.estimated_state")
+        builder.ExportOutput(self._pressure, "affetto.chamber_pressure")
+        return sensors
 
     def _add_teacher(
         self, builder: DiagramBuilder, mouse: Meshcat | None
@@ -575,14 +566,12 @@ class AffettoStation(Diagram):
             config=self.scenario.control,
             joint_names=self.joints.names,
         )
-        array = self.actuation.parameters
         self._gravity = builder.AddNamedSystem(
             "gravity_feedforward",
             GravityFeedforward(
                 self.plant,
                 self.joints.names,
-                array[[Row.K_A, Row.K_B]],
-                resting_pressure(array) - array[Row.ATMOSPHERE],
+                *pressure_differences(self.actuation.parameters),
                 share=self.scenario.control.gravity_share,
             ),
         )
@@ -595,9 +584,7 @@ class AffettoStation(Diagram):
         builder.Connect(
             self._pressure, self.controller.get_chamber_pressure_input_port()
         )
-        connect(
-            builder, self._gravity, self.controller, "equilibrium_offset"
-        )
+        connect(builder, self._gravity, self.controller, "equilibrium_offset")
         builder.Connect(
             self.controller.get_valve_opening_output_port(), command
         )

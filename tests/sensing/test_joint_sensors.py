@@ -40,8 +40,7 @@ def simulate(parameters, seed=0, end=0.5, lead=0.0, start=0.0):
         true_pressure=chambers.get_output_port(),
         parameters=parameters,
         joint_names=["elbow"],
-        q_lower=[-1.0],
-        q_upper=[1.0],
+        limits=([-1.0], [1.0]),
         period=T,
         lead=lead,
     )
