@@ -26,6 +26,7 @@ ORDER = [
     {"motion"},
     {"control"},
     {"pneumatics"},
+    {"sensing"},
     {"sound"},
     {"teaching"},
     {"station", "scenario"},
@@ -38,7 +39,7 @@ ORDER = [
     {"cli"},
 ]
 RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
-STAGES = [name for names in ORDER[1:10] for name in names]
+STAGES = [name for names in ORDER[1:11] for name in names]
 
 # The mathematics, which must also serve who has no Drake. The test adds to
 # them every module of a stage that does not import Drake in its own text.
@@ -54,6 +55,7 @@ DRAKE_FREE = {
     "drake_affetto.pneumatics.flow",
     "drake_affetto.common.resources",
     "drake_affetto.geometry.kinematics",
+    "drake_affetto.sensing.readings",
     "drake_affetto.skill.elm",
     "drake_affetto.sound.voice",
     "drake_affetto.teaching.stroke",
@@ -392,6 +394,7 @@ TESTED_IN = {
     "report/report_data": "report/test_page.py",
     "report/sections": "report/test_page.py",
     "runner/progress": "runner/test_executor.py",
+    "station/gaze_turn": "station/test_station.py",
     "skill/optical": "perception/test_optical_map.py",
     "skill/residuals": "skill/test_transfer.py",
     "skill/search": "skill/test_transfer.py",

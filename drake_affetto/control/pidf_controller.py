@@ -32,15 +32,19 @@ class PidfConfig:
         parameters: YAML file of `ControlParameters`.
         overlays: YAML files that change some of them.
         period: Period of the updates, s.
+        gravity_share: Share of gravity that the demand compensates beforehand,
+            from the robot's model of itself; 0: none.
     """
 
     parameters: str = DEFAULT_FILE
     overlays: list[str] = dataclasses.field(default_factory=list)
     period: float = 0.005
+    gravity_share: float = 0.0
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that cannot be."""
         require_range(f"{where}.period", self.period, 1e-4, 0.1)
+        require_range(f"{where}.gravity_share", self.gravity_share, 0.0, 1.0)
 
 
 class PidfController(LeafSystem):

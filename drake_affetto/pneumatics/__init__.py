@@ -20,11 +20,13 @@ if TYPE_CHECKING:
         PneumaticParameters,
         load_parameters,
     )
+    from drake_affetto.pneumatics.variation import ActuatorVariation
 
 __getattr__, __dir__, __all__ = attach(
     __name__,
     {
         "ActuatorClass": "parameters",
+        "ActuatorVariation": "variation",
         "ContinuousPneumaticActuation": "continuous",
         "ContinuousPneumaticActuation_": "continuous",
         "JointActuator": "parameters",

@@ -32,6 +32,10 @@ from drake_affetto.pneumatics.parameters import (
     load_parameters,
     resting_pressure,
 )
+from drake_affetto.pneumatics.variation import (
+    ActuatorVariation,
+    supply_change,
+)
 
 _MODES = {"flow": FLOW_MODE, "regulator": REGULATOR_MODE}
 
@@ -98,7 +102,8 @@ class PneumaticActuation(LeafSystem):
     steps of the plant: an update reads the joints as one step has left them,
     and its torque is the next one's. Reading them costs no call into Python.
     The parameter array of `chamber.Row` is a numeric parameter of the context,
-    so that actuators can be varied without building a new diagram.
+    so that actuators can be varied without building a new diagram
+    (`set_parameters`). What one trial makes of it is another one (`vary`).
     """
 
     # Indices of the input ports, in the order of their declaration.
@@ -138,6 +143,7 @@ class PneumaticActuation(LeafSystem):
             array.shape,
             f"an array of shape ({ROWS}, n)",
         )
+        self.parameters = array.copy()
         self._n = array.shape[1]
         self._shape = array.shape
         self._mode = _MODES[mode]
@@ -151,6 +157,13 @@ class PneumaticActuation(LeafSystem):
         # The array is kept flat, in column order of no consequence outside.
         self._parameter_index = int(
             self.DeclareNumericParameter(BasicVector(array.ravel()))
+        )
+        # As the trial has drawn them, and how its supply breathes.
+        self._trial_index = int(
+            self.DeclareNumericParameter(BasicVector(array.ravel()))
+        )
+        self._breath_index = int(
+            self.DeclareNumericParameter(BasicVector(np.zeros(4)))
         )
         if self._mode == FLOW_MODE:
             self.DeclareVectorInputPort("valve_opening", n)
@@ -186,6 +199,7 @@ class PneumaticActuation(LeafSystem):
         q_lower: ArrayLike,
         q_upper: ArrayLike,
         parameters: PneumaticParameters | None = None,
+        longest_delay: float = 0.0,
         name: str = "pneumatic_actuation",
     ) -> "PneumaticActuation":
         """Adds the actuators of the named joints to `builder`.
@@ -197,6 +211,7 @@ class PneumaticActuation(LeafSystem):
             q_lower: Lower limits of the joints (n,), rad.
             q_upper: Upper limits of the joints (n,), rad.
             parameters: Parameters themselves, instead of the files.
+            longest_delay: The most that a trial adds to a dead time, s.
             name: Name of the system.
 
         Raises:
@@ -205,11 +220,13 @@ class PneumaticActuation(LeafSystem):
         config.check(name)
         if parameters is None:
             parameters = load_parameters(config.parameters, config.overlays)
+        array = parameters.for_joints(joint_names, q_lower, q_upper)
         system = PneumaticActuation(
-            parameters.for_joints(joint_names, q_lower, q_upper),
+            array,
             mode=config.mode,
             time_step=config.time_step,
             look_ahead=config.look_ahead,
+            max_dead_time=largest_dead_time(array) + longest_delay,
         )
         return builder.AddNamedSystem(name, system)
 
@@ -244,7 +261,7 @@ class PneumaticActuation(LeafSystem):
     def set_parameters(
         self, context: Context, parameters: NDArray[np.float64]
     ) -> None:
-        """Changes the actuators, for instance for a randomized trial.
+        """Changes the actuators; nothing of a trial's draw is left.
 
         Raises:
             InputError: for another shape, or a dead time longer than the one
@@ -264,8 +281,39 @@ class PneumaticActuation(LeafSystem):
             longest,
             f"at most {(self._slots - 2) * self._time_step:g} s",
         )
-        vector = context.get_mutable_numeric_parameter(self._parameter_index)
-        vector.SetFromVector(array.ravel())
+        for index in (self._parameter_index, self._trial_index):
+            vector = context.get_mutable_numeric_parameter(index)
+            vector.SetFromVector(array.ravel())
+        vector = context.get_mutable_numeric_parameter(self._breath_index)
+        vector.SetFromVector(np.zeros(4))
+
+    def trial_parameters(self, context: Context) -> NDArray[np.float64]:
+        """A copy of the (ROWS, n) array that the present trial has drawn."""
+        vector = context.get_numeric_parameter(self._trial_index)
+        return vector.CopyToVector().reshape(self._shape)
+
+    def vary(
+        self, context: Context, variation: ActuatorVariation, seed: int
+    ) -> None:
+        """Draws the actuators and the supply of a trial.
+
+        Whatever an earlier trial has drawn is forgotten.
+
+        Args:
+            context: this system's context.
+            variation: how much they differ.
+            seed: of the trial.
+        """
+        drawn, breath = variation.draw(
+            self.get_parameters(context),
+            np.random.default_rng([seed, 0xAC70A]),
+        )
+        for index, value in (
+            (self._trial_index, drawn.ravel()),
+            (self._breath_index, breath),
+        ):
+            vector = context.get_mutable_numeric_parameter(index)
+            vector.SetFromVector(value)
 
     def set_pressures(
         self, context: Context, p_a: ArrayLike, p_b: ArrayLike
@@ -340,7 +388,7 @@ class PneumaticActuation(LeafSystem):
             self._time_step,
             self._mode,
             self._look_ahead,
-            context.get_numeric_parameter(self._parameter_index).value(),
+            context.get_numeric_parameter(self._trial_index).value(),
             # Views: a port's `Eval` would copy.
             self.EvalVectorInput(context, self._COMMAND).value(),
             self.EvalVectorInput(context, self._STATE).value(),
@@ -348,6 +396,10 @@ class PneumaticActuation(LeafSystem):
             mutable(self._torque_index),
             mutable(self._flow_index),
             mutable(self._memory_index),
+            supply_change(
+                context.get_numeric_parameter(self._breath_index).value(),
+                context.get_time(),
+            ),
         )
 
 

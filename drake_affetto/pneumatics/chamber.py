@@ -415,6 +415,7 @@ def step_joints(
     torque: NDArray[np.float64],
     mass_flow: NDArray[np.float64],
     memory: NDArray[np.float64],
+    supply_change: float = 0.0,
 ) -> None:
     """Advances `n` joints by `h`, in place.
 
@@ -431,6 +432,7 @@ def step_joints(
         mass_flow: (2n) kg/s into each chamber; set to the step's mean.
         memory: see `memory_size`; advanced. Where its first entry is 0 it is
             filled first: valves at rest, ambient temperature, friction at 0.
+        supply_change: what the supply has above its parameter now, Pa.
     """
     # Here and not in Python, where even this counts a thousand times a second.
     parameters = parameters.reshape(ROWS, parameters.size // ROWS)
@@ -530,7 +532,7 @@ def step_joints(
                 c_out,
                 parameters[_CRITICAL_RATIO, i],
                 parameters[_EXPONENT, i],
-                parameters[_SUPPLY, i],
+                parameters[_SUPPLY, i] + supply_change,
                 parameters[_ATMOSPHERE, i],
                 parameters[_TEMPERATURE, i],
             )

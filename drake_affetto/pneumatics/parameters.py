@@ -313,6 +313,27 @@ def resting_pressure(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
     return result
 
 
+def pressure_differences(
+    parameters: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Slope and offset, (n) each, of p_a - p_b over the torque it gives.
+
+    At the mean gauge pressure p_m of the valves' rest the torque is
+    τ = (K_a + K_b) Δp/2 + (K_a - K_b) p_m, friction apart, so that
+    Δp = slope τ + offset.
+
+    Args:
+        parameters: (ROWS, n), see `chamber.Row`.
+
+    Returns:
+        1/m³ and Pa.
+    """
+    K_a, K_b = parameters[Row.K_A], parameters[Row.K_B]
+    mean = resting_pressure(parameters) - parameters[Row.ATMOSPHERE]
+    slope = 2.0 / (K_a + K_b)
+    return slope, -slope * (K_a - K_b) * mean
+
+
 def chamber_volumes(
     parameters: NDArray[np.float64], q: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

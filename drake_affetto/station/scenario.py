@@ -42,6 +42,7 @@ from drake_affetto.pneumatics.actuation import PneumaticActuationConfig
 from drake_affetto.scene.world import ACTIVE_JOINTS, WorldConfig
 from drake_affetto.skill.policy import SkillPolicyConfig
 from drake_affetto.sound.config import load_sound_config
+from drake_affetto.station.variation import VariationConfig
 from drake_affetto.teaching.stroke import TeacherConfig
 
 LONGEST_STEP = 5e-3
@@ -211,6 +212,8 @@ class Scenario:
         dmp: see `motion`.
         control: see `control`.
         pneumatics: see `pneumatics`.
+        variation: whether the robot varies from trial to trial as the real one
+            does; see `variation`.
         sound: YAML file of the drum's voice and of the reward.
         teaching: see `teaching`.
         motion_source: "skill": the robot looks, and moves as its skill says.
@@ -257,6 +260,9 @@ class Scenario:
     control: PidfConfig = dataclasses.field(default_factory=PidfConfig)
     pneumatics: PneumaticActuationConfig = dataclasses.field(
         default_factory=PneumaticActuationConfig
+    )
+    variation: VariationConfig = dataclasses.field(
+        default_factory=VariationConfig
     )
     sound: str = "package://drake_affetto/sound.yaml"
     teaching: TeacherConfig = dataclasses.field(default_factory=TeacherConfig)

@@ -20,8 +20,6 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 from pydrake.systems.primitives import (
-    Adder,
-    ConstantVectorSource,
     MatrixGain,
     PassThrough,
 )
@@ -29,6 +27,7 @@ from pydrake.systems.sensors import CameraInfo
 
 from drake_affetto.common.errors import require
 from drake_affetto.common.systems import connect
+from drake_affetto.control.gravity_feedforward import GravityFeedforward
 from drake_affetto.control.pidf_controller import PidfController
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.motion.dmp_source import DmpSource
@@ -38,9 +37,12 @@ from drake_affetto.perception.gaze import GazeMode, GazeTask
 from drake_affetto.perception.gaze_servo import GazeServo, gaze_view
 from drake_affetto.perception.mirror_camera import MirrorCamera
 from drake_affetto.pneumatics.actuation import PneumaticActuation
+from drake_affetto.pneumatics.parameters import pressure_differences
 from drake_affetto.scene import world
+from drake_affetto.sensing.joint_sensors import JointSensors
 from drake_affetto.skill.policy import SkillPolicy
 from drake_affetto.sound.microphone import DrumMicrophone
+from drake_affetto.station.gaze_turn import add_gaze_turn
 from drake_affetto.station.joint_state import make_joint_state
 from drake_affetto.station.scenario import Scenario
 from drake_affetto.teaching.kinesthetic_teacher import KinestheticTeacher
@@ -68,6 +70,7 @@ class AffettoStation(Diagram):
         - affetto.valve_opening (valve_source external, flow mode)
         - affetto.pressure_command (valve_source external, regulator mode)
         output_ports:
+        - affetto.joint_state
         - affetto.estimated_state
         - affetto.desired_state
         - affetto.valve_opening
@@ -89,12 +92,13 @@ class AffettoStation(Diagram):
 
     With n active joints, in the scenario's order:
 
-    - affetto.estimated_state, affetto.desired_state (2n): rad, rad/s, both at
-      the same time (see `joint_state`).
+    - affetto.joint_state, affetto.desired_state (2n): rad, rad/s, both at the
+      same time (see `joint_state`).
+    - affetto.estimated_state (2n): the same as the robot's sensors have it.
     - affetto.valve_opening (n): v⁺ in [-1, 1].
     - affetto.pid_output (n): u_PID, Pa.
     - affetto.actuation (n): N m.
-    - affetto.chamber_pressure (2n): [p_a; p_b], Pa absolute.
+    - affetto.chamber_pressure (2n): [p_a; p_b] as read, Pa absolute.
     - affetto.mass_flow (2n): into the chambers, kg/s.
     - affetto.policy_parameters (n·K): θ, rad/s².
     - affetto.start_time (1): when θ is played, s.
@@ -141,6 +145,7 @@ class AffettoStation(Diagram):
             "False without a meshcat",
         )
         self.scenario = scenario
+        self._variation = scenario.variation.load()
         builder = DiagramBuilder()
         self.plant: MultibodyPlant
         self.scene_graph: SceneGraph
@@ -159,9 +164,10 @@ class AffettoStation(Diagram):
                 for name in self.joints.names
             ]
         )
-        self._estimated_state = self._add_estimation(builder)
+        self._true_state = self._add_joint_state(builder)
         self._add_teacher(builder, meshcat if by_mouse else None)
         self._add_actuation(builder)
+        self.sensors = self._add_sensors(builder)
         self._add_sight(builder)
         self._add_hearing(builder)
         desired = self._add_motion(builder)
@@ -212,6 +218,8 @@ class AffettoStation(Diagram):
         mine = self._mine(context)
         self.SetDefaultContext(mine)
         self._balance_gravity(context)
+        self.set_seed(context, self.scenario.random_seed)
+        self._reset_sensors(context)
         if self.scenario.motion_source == "skill":
             look = self.scenario.look
             self.gaze.set_task(
@@ -241,7 +249,10 @@ class AffettoStation(Diagram):
         if self.scenario.valve_source == "pidf":
             controller = self._sub(self.controller, context)
             self.controller.reset(controller, p_a - p_b)
-            self.controller.set_integral(controller, p_a - p_b)
+            known = self._gravity.reset(
+                self._sub(self._gravity, context), self.start_posture
+            )
+            self.controller.set_integral(controller, p_a - p_b - known)
 
     def set_drum_position(self, context: Context, xy: ArrayLike) -> None:
         """Puts the drum at xy (2,), m, on the table in the world frame.
@@ -290,6 +301,29 @@ class AffettoStation(Diagram):
         self._joint_state.SetDefaultContext(
             self._sub(self._joint_state, context)
         )
+        self._reset_sensors(context)
+
+    def set_seed(self, context: Context, seed: int) -> None:
+        """Sets the seed of all that differs from trial to trial."""
+        self.camera.set_seed(self._sub(self.camera, context), seed)
+        if self.sensors is not None:
+            self.sensors.set_seed(self._sub(self.sensors, context), seed)
+            self.actuation.vary(
+                self._sub(self.actuation, context),
+                self._variation.actuators,
+                seed,
+            )
+
+    def _reset_sensors(self, context: Context) -> None:
+        """Lets the sensors read a robot that has just been put at rest."""
+        if self.sensors is not None:
+            self.sensors.reset(
+                self._sub(self.sensors, context),
+                self._true_state.Eval(self._sub(self._joint_state, context)),
+                self.actuation.get_chamber_pressure_output_port().Eval(
+                    self._sub(self.actuation, context)
+                ),
+            )
 
     def _mine(self, context: Context) -> Context:
         """The station's context, from itself or from the root's."""
@@ -303,7 +337,7 @@ class AffettoStation(Diagram):
         """The system's context, from the station's or from the root's."""
         return self.GetMutableSubsystemContext(system, self._mine(context))
 
-    def _add_estimation(self, builder: DiagramBuilder) -> OutputPort:
+    def _add_joint_state(self, builder: DiagramBuilder) -> OutputPort:
         self._joint_state = builder.AddNamedSystem(
             "joint_state",
             make_joint_state(self.joints, self.scenario.plant_config.time_step),
@@ -312,9 +346,33 @@ class AffettoStation(Diagram):
             self.plant.get_state_output_port(self._robot),
             self._joint_state.get_input_port(),
         )
-        estimated = self._joint_state.get_output_port()
-        builder.ExportOutput(estimated, "affetto.estimated_state")
-        return estimated
+        state = self._joint_state.get_output_port()
+        builder.ExportOutput(state, "affetto.joint_state")
+        return state
+
+    def _add_sensors(self, builder: DiagramBuilder) -> JointSensors | None:
+        """Adds the sensors of a robot that varies."""
+        self._estimated_state = self._true_state
+        self._pressure = self.actuation.get_chamber_pressure_output_port()
+        sensors = None
+        if self.scenario.variation.enabled:
+            sensors = JointSensors.AddToBuilder(
+                builder=builder,
+                joint_state=self._true_state,
+                true_pressure=self._pressure,
+                parameters=self._variation.sensors,
+                joint_names=self.joints.names,
+                limits=self._q_limits,
+                period=self.scenario.control.period,
+                # With the actuators' update: the joints are by then those of
+                # the tick, the pressures those of one step before.
+                lead=0.5 * self.scenario.plant_config.time_step,
+            )
+            self._estimated_state = sensors.get_estimated_state_output_port()
+            self._pressure = sensors.get_chamber_pressure_output_port()
+        builder.ExportOutput(self._estimated_state, "affetto.estimated_state")
+        builder.ExportOutput(self._pressure, "affetto.chamber_pressure")
+        return sensors
 
     def _add_teacher(
         self, builder: DiagramBuilder, mouse: Meshcat | None
@@ -337,25 +395,26 @@ class AffettoStation(Diagram):
                 config=teaching,
             )
             builder.Connect(
-                self._estimated_state,
+                self._true_state,
                 self.teacher.get_estimated_state_input_port(),
             )
             pull = self.teacher.get_pulling_force_output_port()
         builder.ExportOutput(pull, "teacher.pulling_force")
 
     def _add_actuation(self, builder: DiagramBuilder) -> None:
-        lower, upper = world.joint_limits(self.plant, self.joints.names)
+        self._q_limits = world.joint_limits(self.plant, self.joints.names)
         config = self.scenario.pneumatics
         config.time_step = self.scenario.plant_config.time_step
         self.actuation = PneumaticActuation.AddToBuilder(
             builder=builder,
             config=config,
             joint_names=self.joints.names,
-            q_lower=lower,
-            q_upper=upper,
+            q_lower=self._q_limits[0],
+            q_upper=self._q_limits[1],
+            longest_delay=self._variation.actuators.longest_delay,
         )
         builder.Connect(
-            self._estimated_state,
+            self._true_state,
             self.actuation.get_estimated_state_input_port(),
         )
         spread = builder.AddNamedSystem(
@@ -373,7 +432,6 @@ class AffettoStation(Diagram):
             builder,
             "affetto",
             self.actuation.get_actuation_output_port(),
-            self.actuation.get_chamber_pressure_output_port(),
             self.actuation.get_mass_flow_output_port(),
         )
 
@@ -487,34 +545,13 @@ class AffettoStation(Diagram):
             self.gaze.get_task_parameter_output_port(),
             self.gaze.get_settled_output_port(),
         )
-        return self._add_gaze_turn(
-            builder, self.dmp_source.get_desired_state_output_port()
+        return add_gaze_turn(
+            builder,
+            self.dmp_source.get_desired_state_output_port(),
+            self.gaze.get_yaw_command_output_port(),
+            self._yaw,
+            self.start_posture[self._yaw],
         )
-
-    def _add_gaze_turn(
-        self, builder: DiagramBuilder, movement: OutputPort
-    ) -> OutputPort:
-        """Adds the gaze's turn to the movement; returns [q; q̇] desired.
-
-        The gaze turns the yaw away from the movement's yaw. It returns when
-        it is done, so that only the movement is left.
-        """
-        n = self.num_joints
-        turn = np.zeros((2 * n, 1))
-        turn[self._yaw] = 1.0
-        spread = builder.AddNamedSystem("gaze_turn", MatrixGain(D=turn))
-        straight = builder.AddNamedSystem(
-            "gaze_straight",
-            ConstantVectorSource(-turn[:, 0] * self.start_posture[self._yaw]),
-        )
-        total = builder.AddNamedSystem("desired_state", Adder(3, 2 * n))
-        builder.Connect(
-            self.gaze.get_yaw_command_output_port(), spread.get_input_port()
-        )
-        builder.Connect(movement, total.get_input_port(0))
-        builder.Connect(spread.get_output_port(), total.get_input_port(1))
-        builder.Connect(straight.get_output_port(), total.get_input_port(2))
-        return total.get_output_port()
 
     def _add_control(
         self, builder: DiagramBuilder, desired: OutputPort
@@ -529,20 +566,25 @@ class AffettoStation(Diagram):
             config=self.scenario.control,
             joint_names=self.joints.names,
         )
-        self._offset = builder.AddNamedSystem(
-            "equilibrium_offset",
-            ConstantVectorSource(np.zeros(self.num_joints)),
+        self._gravity = builder.AddNamedSystem(
+            "gravity_feedforward",
+            GravityFeedforward(
+                self.plant,
+                self.joints.names,
+                *pressure_differences(self.actuation.parameters),
+                share=self.scenario.control.gravity_share,
+            ),
         )
+        builder.Connect(desired, self._gravity.get_desired_state_input_port())
         builder.Connect(desired, self.controller.get_desired_state_input_port())
         builder.Connect(
             self._estimated_state,
             self.controller.get_estimated_state_input_port(),
         )
-        connect(builder, self.actuation, self.controller, "chamber_pressure")
         builder.Connect(
-            self._offset.get_output_port(),
-            self.controller.get_equilibrium_offset_input_port(),
+            self._pressure, self.controller.get_chamber_pressure_input_port()
         )
+        connect(builder, self._gravity, self.controller, "equilibrium_offset")
         builder.Connect(
             self.controller.get_valve_opening_output_port(), command
         )
@@ -556,11 +598,11 @@ class AffettoStation(Diagram):
     def set_equilibrium_offset(
         self, context: Context, offset: Sequence[float] | np.ndarray
     ) -> None:
-        """Sets the offset (n,), Pa, that is added to u_PID (paper Eq. 8)."""
-        value = self._offset.get_mutable_source_value(
-            self._sub(self._offset, context)
-        )
-        value.SetFromVector(np.asarray(offset, float))
+        """Sets the offset (n,), Pa, that is added to u_PID (paper Eq. 8).
+
+        It takes the place of the gravity that the controller compensates.
+        """
+        self._gravity.set_constant(self._sub(self._gravity, context), offset)
 
 
 def _export(builder: DiagramBuilder, part: str, *ports: OutputPort) -> None:

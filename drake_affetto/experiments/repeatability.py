@@ -1,0 +1,97 @@
+"""How well the robot repeats a command: one movement, many trials."""
+
+from collections.abc import Sequence
+import dataclasses
+
+import numpy as np
+
+from drake_affetto.common.typing import Array
+from drake_affetto.experiments.episode import TrialRunner
+from drake_affetto.scene import world
+
+
+@dataclasses.dataclass
+class Repeatability:
+    """Scatter and tracking of one movement over R trials.
+
+    Attributes:
+        joints: Names of the n joints.
+        scatter: Rms deviation (n,) of a joint from its mean course, fraction
+            of its range.
+        tracking: Rms error (n,) from the desired course, fraction of range.
+        lag: Delay (n,) by which the desired course fits the joint best, s.
+        lowest: Height (R,) of the palm at its lowest, m in the world.
+    """
+
+    joints: list[str]
+    scatter: Array
+    tracking: Array
+    lag: Array
+    lowest: Array
+
+
+def measure_repeatability(
+    trials: TrialRunner, xy: Array, theta: Array, seeds: Sequence[int]
+) -> Repeatability:
+    """Executes a movement once for each seed, the drum at xy.
+
+    Args:
+        trials: Runner of the scenario's trials.
+        xy: Position of the drum (2,), m.
+        theta: Parameters of the movement (n·K,).
+        seeds: Seeds of the R trials.
+    """
+    station = trials.station
+    n = station.num_joints
+    lower, upper = world.joint_limits(station.plant, station.joints.names)
+    span = upper - lower
+    recordings = [trials.strike(xy, theta, seed) for seed in seeds]
+    q = np.stack([each.true_state[:, :n] for each in recordings])
+    desired = recordings[0].desired_state[:, :n]
+    deviation = q - q.mean(axis=0)
+    # Of R trials about their own mean.
+    free = len(seeds) / max(len(seeds) - 1, 1)
+    t = recordings[0].joint_t
+    return Repeatability(
+        joints=list(station.joints.names),
+        scatter=np.sqrt(free * np.mean(deviation**2, axis=(0, 1))) / span,
+        tracking=np.sqrt(np.mean((q - desired) ** 2, axis=(0, 1))) / span,
+        lag=np.array(
+            [best_lag(t, desired[:, j], q[:, :, j]) for j in range(n)]
+        ),
+        lowest=np.array(
+            [
+                palm_path(trials, each.true_state)[:, 2].min()
+                for each in recordings
+            ]
+        ),
+    )
+
+
+def best_lag(t: Array, desired: Array, q: Array, longest: float = 0.6) -> float:
+    """The delay that fits `desired` best to all courses `q`, s.
+
+    Args:
+        t: Evenly spaced times (T,), s.
+        desired: Desired course (T,), rad.
+        q: Courses (R, T), rad.
+        longest: Longest delay that is tried, s.
+    """
+    step = t[1] - t[0]
+    mean = q.mean(axis=0)
+    errors = [
+        np.mean((mean[k:] - desired[: len(desired) - k]) ** 2)
+        for k in range(round(longest / step))
+    ]
+    return float(np.argmin(errors) * step)
+
+
+def palm_path(trials: TrialRunner, state: Array) -> Array:
+    """Positions (T, 3) of the palm, m in the world.
+
+    Args:
+        trials: Runner whose robot it is.
+        state: Angles and speeds (T, 2n), rad and rad/s.
+    """
+    teacher = trials.station.teacher
+    return np.array([teacher.palm(each)[0] for each in state])
