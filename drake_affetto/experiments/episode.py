@@ -106,6 +106,21 @@ class GuidedMovement:
     max_pull: float
 
 
+@dataclasses.dataclass(frozen=True)
+class _Look:
+    """The last search of a runner, and the station at its end.
+
+    Attributes:
+        key: Position of the drum and seed of the trial.
+        outcome: Outcome of the search.
+        end: Context at its end.
+    """
+
+    key: tuple[float, float, int]
+    outcome: GazeOutcome
+    end: Context
+
+
 class TrialRunner:
     """Runs trials of one scenario on one station."""
 
@@ -169,6 +184,7 @@ class TrialRunner:
         self.reward_config = sound.reward
         self.meshcat = meshcat
         self._settled: Context | None = None
+        self._looked: _Look | None = None
         self._taps: list[Array] | None = None
 
     def tap_prototypes(self) -> list[Array]:
@@ -318,20 +334,39 @@ class TrialRunner:
             The outcome of the gaze, and the recording (None if the drum was
             not found).
         """
-        begin = self._start(xy, seed)
-        policy = self._sub(self.station.policy)
-        self.station.policy.set_regressor(policy, regressor)
-        self._enable_gaze()
-        outcome = self._wait_for_gaze(begin)
+        outcome = self._look(xy, seed)
         if not outcome.found:
             return outcome, None
-        limit = begin + self.scenario.gaze.timeout + 5.0
+        policy = self._sub(self.station.policy)
+        self.station.policy.set_regressor(policy, regressor)
+        limit = self.context.get_time() + 5.0
         while not self.station.policy.is_latched(policy):
             if self.context.get_time() > limit:
                 raise RuntimeError("the gaze has settled but is never ready")
-            self._advance(self.context.get_time() + 0.05)
+            self._advance(self.context.get_time() + FRAME_PERIOD)
         start = float(self.port("affetto.start_time")[0])
         return outcome, self._record(start, seed)
+
+    def _look(self, xy: Array, seed: int) -> GazeOutcome:
+        """The search for the drum, at whose end the station then is.
+
+        It knows nothing of the movement that follows. So the station's state
+        at the end of the last search is kept: further movements of the same
+        trial go on from there, exactly as if the search came before each.
+        """
+        key = (float(xy[0]), float(xy[1]), seed)
+        if self._looked is None or self._looked.key != key:
+            outcome = self.gaze(xy, seed)
+            if self._looked is None:
+                end = self.context.Clone()
+            else:
+                end = self._looked.end
+                self._copy(self.context, end)
+            self._looked = _Look(key, outcome, end)
+        self._copy(self._looked.end, self.context)
+        self._clear_logs()
+        self.simulator.Initialize()
+        return self._looked.outcome
 
     def port(self, name: str):
         """The value now of the station's output port `name`."""
@@ -356,27 +391,25 @@ class TrialRunner:
             self.simulator.Initialize()
             self._advance(self._start_time + self.scenario.settling_duration)
             self._settled = self.context.Clone()
-        self._restore(self._settled)
+        self._copy(self._settled, self.context)
         self.station.set_drum_position(self._station_context, xy)
         self.station.set_seed(self._station_context, seed)
         self._clear_logs()
         self.simulator.Initialize()
         return self.context.get_time()
 
-    def _restore(self, settled: Context) -> None:
-        """Takes time, state and parameters over from another context.
+    def _copy(self, source: Context, target: Context) -> None:
+        """Takes time, state and parameters over from one context to another.
 
         All but the geometries, which no trial changes: to copy them means to
         copy the render engines, forty times the cost of all else.
         """
-        self.context.SetTime(settled.get_time())
+        target.SetTime(source.get_time())
         for system in self.station.GetSystems():
             if not isinstance(system, SceneGraph):
                 system.GetMyMutableContextFromRoot(
-                    self.context
-                ).SetStateAndParametersFrom(
-                    system.GetMyContextFromRoot(settled)
-                )
+                    target
+                ).SetStateAndParametersFrom(system.GetMyContextFromRoot(source))
 
     def _enable_gaze(self) -> None:
         self.station.gaze.set_enabled(self._sub(self.station.gaze), True)
