@@ -71,6 +71,7 @@ class Recording:
         joint_state: Angles and speeds (S, 2n), rad, rad/s.
         desired_state: Desired angles and speeds (S, 2n), rad, rad/s.
         chamber_pressure: Absolute pressures (S, 2n), Pa.
+        valve_opening: Commands to the valves (S, n), -1 to 1.
         sound: Sound pressure at the microphone (samples,), Pa.
         sound_rate: Sampling rate of the sound, 1/s.
     """
@@ -82,6 +83,7 @@ class Recording:
     joint_state: Array
     desired_state: Array
     chamber_pressure: Array
+    valve_opening: Array
     sound: Array
     sound_rate: float
 
@@ -143,6 +145,7 @@ class TrialRunner:
             "affetto.estimated_state": 1.0 / scenario.teaching.recording_rate,
             "affetto.desired_state": 1.0 / scenario.teaching.recording_rate,
             "affetto.chamber_pressure": 1.0 / scenario.teaching.recording_rate,
+            "affetto.valve_opening": 1.0 / scenario.teaching.recording_rate,
             "affetto.pid_output": scenario.control.period,
             "teacher.pulling_force": 1.0 / scenario.teaching.update_rate,
         }
@@ -424,6 +427,7 @@ class TrialRunner:
             joint_state=state,
             desired_state=self._log("affetto.desired_state")[1],
             chamber_pressure=self._log("affetto.chamber_pressure")[1],
+            valve_opening=self._log("affetto.valve_opening")[1],
             sound=sound,
             sound_rate=self.voice.rate,
         )
