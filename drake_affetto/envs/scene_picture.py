@@ -12,7 +12,7 @@ from pydrake.systems.framework import Context
 from pydrake.systems.sensors import CameraInfo
 
 from drake_affetto.common.typing import Image
-from drake_affetto.perception.mirror_camera import DIRECT
+from drake_affetto.perception.mirror_camera import make_renderer
 from drake_affetto.scene.view import (
     CAMERA_POSITION,
     CAMERA_TARGET,
@@ -22,6 +22,8 @@ from drake_affetto.station.station import AffettoStation
 
 RENDER_MODES = ["rgb_array", "human"]
 
+# The renderer for which the models name what is seen from outside.
+_OUTSIDE = "outside"
 _FOV_Y = 0.75
 
 
@@ -39,12 +41,16 @@ def take_picture(
         width: Width of the picture, pixels.
         height: Height of the picture, pixels.
     """
-    camera = station.camera
-    query = camera.get_query_object_input_port().Eval(
-        camera.GetMyContextFromRoot(context)
-    )
+    scene = station.GetSubsystemByName("seen_scene")
+    mine = scene.GetMyMutableContextFromRoot(context)
+    # The robot's own renderers leave out its head, or the mirror.
+    if not scene.HasRenderer(mine, _OUTSIDE):
+        scene.AddRenderer(
+            mine, _OUTSIDE, make_renderer(station.scenario.rendering)
+        )
+    query = scene.get_query_output_port().Eval(mine)
     core = RenderCameraCore(
-        DIRECT,
+        _OUTSIDE,
         CameraInfo(width=width, height=height, fov_y=_FOV_Y),
         ClippingRange(0.05, 5.0),
         RigidTransform(),
