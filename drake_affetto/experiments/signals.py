@@ -23,7 +23,6 @@ from drake_affetto.experiments.trials import (
     runner,
 )
 from drake_affetto.runner.executor import Spec
-from drake_affetto.runner.store import trial_key
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,8 +97,8 @@ def check_suffix(path: str | Path) -> Path:
     return path
 
 
-def read_spec(folder: str | Path, key: str) -> Spec:
-    """What determines a stored trial, with its arrays.
+def read_spec(folder: str | Path, key: str) -> tuple[str, Spec]:
+    """The whole key of a stored trial, and what determines it.
 
     Args:
         folder: Folder of a study.
@@ -110,11 +109,11 @@ def read_spec(folder: str | Path, key: str) -> Spec:
             its scenario is another one by now.
     """
     with open_store(folder) as store:
-        spec = store.spec(key)
+        whole, spec = store.spec(key)
     if not isinstance(spec.get("scenario"), dict):
         raise InputError(f"trial {key} is no trial on the station")
     check_scenario(spec)
-    return spec
+    return whole, spec
 
 
 def run_again(folder: str | Path, key: str) -> TrialResult:
@@ -123,7 +122,7 @@ def run_again(folder: str | Path, key: str) -> TrialResult:
     Raises:
         InputError: As `read_spec`.
     """
-    return run_trial(read_spec(folder, key))
+    return run_trial(read_spec(folder, key)[1])
 
 
 def read_signals(folder: str | Path, key: str) -> Signals:
@@ -138,7 +137,7 @@ def read_signals(folder: str | Path, key: str) -> Signals:
     Raises:
         InputError: As `read_spec`, or if nothing was moved in that trial.
     """
-    spec = read_spec(folder, key)
+    whole, spec = read_spec(folder, key)
     trials = runner(spec["scenario"]["name"])
     recording = _record(trials, spec)
     if recording is None:
@@ -147,7 +146,7 @@ def read_signals(folder: str | Path, key: str) -> Signals:
         )
     n = trials.station.num_joints
     return Signals(
-        key=trial_key(spec),
+        key=whole,
         joint_names=trials.station.joints.names,
         t=recording.joint_t,
         q=recording.joint_state[:, :n],

@@ -311,8 +311,8 @@ class TrialStore:
                 f"cannot read trials in {self.path}: {error}"
             ) from error
 
-    def spec(self, key: str) -> dict[str, Any]:
-        """The spec of a finished trial, with its arrays.
+    def spec(self, key: str) -> tuple[str, dict[str, Any]]:
+        """The whole key and the spec of a finished trial, with its arrays.
 
         Args:
             key: The trial's key, or as much of it as no other trial's has.
@@ -333,6 +333,8 @@ class TrialStore:
                 )
             whole, text = found[0]
             where = f"{self.path}: trial {whole}"
+            if text_digest(text, length=None) != whole:
+                raise InputError(f"{where}: its spec is damaged")
             spec = map_leaves(
                 _object(text, f"{where}: spec"),
                 lambda leaf: self._input(leaf, where),
@@ -341,9 +343,7 @@ class TrialStore:
             raise InputError(
                 f"cannot read trials in {self.path}: {error}"
             ) from error
-        if trial_key(spec) != whole:
-            raise InputError(f"{where} does not hold what its key stands for")
-        return spec
+        return whole, spec
 
     def _input(self, leaf: Any, where: str) -> Any:
         """The array that a text in a stored spec stands for; others stay."""

@@ -88,7 +88,7 @@ def test_what_cannot_be_run_again_is_told(study, tmp_path, monkeypatch):
     monkeypatch.setattr(
         trials, "_fingerprint", lambda name: {"name": name, "models": "new"}
     )
-    with pytest.raises(InputError, match="not the one .* other models"):
+    with pytest.raises(InputError, match=r"not the one .* other models"):
         run_again(folder, keys["strike"][0])
 
 
@@ -96,5 +96,5 @@ def test_a_skill_is_not_kept(tmp_path):
     spec = trials.drumming("drumming", XY, 1, object(), [np.ones((2, 2))])
     with TrialStore(tmp_path / STORE) as store:
         store.put(spec, {}, {})
-    with pytest.raises(InputError, match="an? object that is not kept"):
+    with pytest.raises(InputError, match="object that is not kept"):
         run_again(tmp_path, trial_key(spec))

@@ -127,12 +127,12 @@ def test_a_spec_comes_back_with_its_arrays(tmp_path):
         keys = [row.key for row in store.rows()]
         assert keys == [trial_key(each) for each in many]
         np.testing.assert_array_equal(
-            store.spec(keys[1][:9])["more"][0], np.ones((2, 3))
+            store.spec(keys[1][:9])[1]["more"][0], np.ones((2, 3))
         )
     with TrialStore(tmp_path / "b.sqlite") as other:
         # Another study that takes trials over can run them again, too.
         assert other.merge(tmp_path / "a.sqlite") == 2
-        np.testing.assert_array_equal(other.spec(keys[0])["theta"], array)
+        np.testing.assert_array_equal(other.spec(keys[0])[1]["theta"], array)
         with pytest.raises(InputError, match="key is ''"):
             other.spec("")
 
@@ -145,7 +145,7 @@ def test_a_spec_that_was_changed_is_refused(tmp_path):
             "UPDATE trials SET spec = replace(spec, ?, ?)",
             ('"seed": 3', '"seed": 4'),
         )
-        with pytest.raises(InputError, match="does not hold what its key"):
+        with pytest.raises(InputError, match="its spec is damaged"):
             store.spec(key)
         store._db.execute("UPDATE trials SET spec = '{'")
         with pytest.raises(InputError, match="is damaged"):
