@@ -1,7 +1,7 @@
 """One movement an episode: see the drum, strike it, hear how it sounded."""
 
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 from gymnasium import spaces
@@ -46,10 +46,7 @@ class DrumEnv(gymnasium.Env):
     Neither observation nor reward reads where the drum is.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
-        "render_modes": RENDER_MODES,
-        "render_fps": 1,
-    }
+    metadata = {"render_modes": RENDER_MODES, "render_fps": 1}  # noqa: RUF012
 
     def __init__(
         self,
@@ -122,7 +119,7 @@ class DrumEnv(gymnasium.Env):
         result = self._strike(
             trials.strike(
                 self._name,
-                self._xy,
+                self._xy.tolist(),
                 int(self.np_random.integers(2**31)),
                 theta,
                 self._prototypes,
@@ -156,7 +153,8 @@ class DrumEnv(gymnasium.Env):
         if self.render_mode != "rgb_array":
             return self._typed(spec)
         runner = self._runner()
-        touched, halfway = [], []
+        touched: list[Image] = []
+        halfway: list[Image] = []
 
         def watch(root: Context) -> None:
             start = runner.port("affetto.start_time")[0]

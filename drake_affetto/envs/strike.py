@@ -2,7 +2,7 @@
 
 import dataclasses
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 from gymnasium import spaces
@@ -55,10 +55,7 @@ class StrikeEnv(gymnasium.Env):
     - `info` has `success` in the last step.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
-        "render_modes": RENDER_MODES,
-        "render_fps": 20,
-    }
+    metadata = {"render_modes": RENDER_MODES, "render_fps": 20}  # noqa: RUF012
 
     def __init__(
         self,
@@ -115,22 +112,21 @@ class StrikeEnv(gymnasium.Env):
         )
         n = self._station.num_joints
         self.observation_space = spaces.Box(
-            *(
-                np.concatenate(parts).astype(np.float32)
-                for parts in (
-                    (
-                        self._low - _BEYOND,
-                        [-_FASTEST] * n,
-                        [0.0] * 2 * n,
-                        [-2.0, -2.0, 0.0],
-                    ),
-                    (
-                        self._high + _BEYOND,
-                        [_FASTEST] * n,
-                        [_HIGHEST_PRESSURE] * 2 * n,
-                        [2.0, 2.0, 1.0],
-                    ),
-                )
+            _join(
+                self._low - _BEYOND,
+                [-_FASTEST] * n,
+                [0.0] * 2 * n,
+                -2.0,
+                -2.0,
+                0.0,
+            ),
+            _join(
+                self._high + _BEYOND,
+                [_FASTEST] * n,
+                [_HIGHEST_PRESSURE] * 2 * n,
+                2.0,
+                2.0,
+                1.0,
             ),
             dtype=np.float32,
         )
@@ -240,3 +236,8 @@ class StrikeEnv(gymnasium.Env):
         space = self.observation_space
         assert isinstance(space, spaces.Box)
         return np.clip(values.astype(np.float32), space.low, space.high)
+
+
+def _join(*parts: Any) -> np.ndarray:
+    """Numbers and vectors as one vector of float32."""
+    return np.hstack(parts).astype(np.float32)
