@@ -112,7 +112,7 @@ for episode in range(args.episodes):
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # noqa: E402
 
-window = 20
+window = min(20, args.episodes)
 rate = np.convolve(curve, np.ones(window) / window, "valid")
 figure, axes = plt.subplots(figsize=(6, 3.5), layout="constrained")
 axes.plot(np.arange(window, len(curve) + 1), 100 * rate)
