@@ -2,7 +2,7 @@
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import RevoluteJoint, SpatialInertia
+from pydrake.multibody.tree import RevoluteJoint, SpatialInertia, UnitInertia
 import pytest
 
 from drake_affetto.common.errors import InputError
@@ -17,7 +17,11 @@ def plant():
     plant = MultibodyPlant(0.0)
     bar = plant.AddRigidBody(
         "bar",
-        SpatialInertia.PointMass(MASS, [0.0, 0.0, -LENGTH]),
+        SpatialInertia(
+            MASS,
+            [0.0, 0.0, -LENGTH],
+            UnitInertia(LENGTH**2 + 1e-4, LENGTH**2 + 1e-4, 1e-4),
+        ),
     )
     plant.AddJoint(
         RevoluteJoint(

@@ -23,7 +23,7 @@ def trials():
 @pytest.fixture(scope="module")
 def repeated(trials):
     theta = trials.teach(XY, 3).theta
-    return measure_repeatability(trials, XY, theta, range(12))
+    return measure_repeatability(trials, XY, theta, range(20))
 
 
 def test_lag_is_the_shift_of_a_shifted_course():
@@ -36,10 +36,9 @@ def test_repeats_scatter_as_a_real_robots_do(repeated):
     scatter = dict(zip(repeated.joints, 100.0 * repeated.scatter, strict=True))
     # The abduction hardly moves in a stroke.
     assert scatter.pop("right_shoulder_abduction") < 0.5
-    # Somewhat below the 0.5 % to 1.5 % that are wanted: see models/
-    # variation.yaml. A joint that keeps still by friction repeats better.
-    assert 0.2 < min(scatter.values()) < max(scatter.values()) < 1.5
-    assert 0.4 < np.median(list(scatter.values())) < 1.5
+    # A joint that moves little sticks, and repeats better.
+    assert 0.3 < min(scatter.values()) < max(scatter.values()) < 1.5
+    assert 0.5 < np.median(list(scatter.values()))
 
 
 def test_without_variation_a_command_gives_one_movement():
@@ -81,4 +80,4 @@ def test_free_replays_go_as_deep_as_the_taught_path(trials):
     ]
     depths = [replay_depth(trials, xy, k) for k, xy in enumerate(places)]
     assert np.median(np.abs(depths)) < 0.005
-    assert np.abs(depths).max() < 0.012
+    assert np.abs(depths).max() < 0.010
