@@ -203,6 +203,7 @@ def test_shut_valves_hold_the_air_by_the_polytropic_law():
     """p Vⁿ stays in every chamber as unequal pressures move the arm."""
     scenario = load_scenario("drumming")
     scenario.motion_source = scenario.valve_source = "external"
+    scenario.variation.enabled = False
     station = AffettoStation(scenario)
     context = station.CreateDefaultContext()
     own = station.GetMutableSubsystemContext(station.actuation, context)
