@@ -38,7 +38,7 @@ def test_repeats_scatter_as_a_real_robots_do(repeated):
     assert scatter.pop("right_shoulder_abduction") < 0.5
     # A joint that moves little sticks, and repeats better.
     assert 0.3 < min(scatter.values()) < max(scatter.values()) < 1.5
-    assert 0.5 < np.median(list(scatter.values()))
+    assert np.median(list(scatter.values())) > 0.5
 
 
 def test_without_variation_a_command_gives_one_movement():
