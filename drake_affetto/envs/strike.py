@@ -156,7 +156,9 @@ class StrikeEnv(gymnasium.Env):
             self._lesson = self._lessons.q[int(away.argmin())]
         self._target = self._station.start_posture
         self._command(self._target, 0.0 * self._target)
-        self._begin = self._runner.settle(xy)
+        self._begin = self._runner.settle(
+            xy, int(self.np_random.integers(2**31))
+        )
         self._step = 0
         return self._observe(), {}
 

@@ -1,4 +1,4 @@
-"""How well the robot repeats a command: one movement, many trials."""
+"""How well the robot repeats a command, and a replay the taught path."""
 
 from collections.abc import Sequence
 import dataclasses
@@ -95,3 +95,30 @@ def palm_path(trials: TrialRunner, state: Array) -> Array:
     """
     teacher = trials.station.teacher
     return np.array([teacher.palm(each)[0] for each in state])
+
+
+def replay_depth(trials: TrialRunner, xy: Array, seed: int) -> float:
+    """How much higher a free replay's lowest point is than the taught one, m.
+
+    The stroke is taught on the drum at xy; for the replay the drum stands at
+    the corner of the table that is farthest away.
+
+    Args:
+        trials: Runner of the scenario's trials.
+        xy: Position of the drum (2,), m.
+        seed: Seed of teaching and replay.
+    """
+    xy = np.asarray(xy, float)
+    guided = trials.teach(xy, seed)
+    taught = palm_path(trials, np.hstack([guided.q, np.zeros_like(guided.q)]))
+    low, high = world.drum_limits(
+        trials.station.plant,
+        trials.station.plant.GetMyContextFromRoot(trials.context),
+    )
+    corners = [
+        np.array([x, y]) for x in (low[0], high[0]) for y in (low[1], high[1])
+    ]
+    away = max(corners, key=lambda each: float(np.linalg.norm(each - xy)))
+    replay = trials.strike(away, guided.theta, seed + 1)
+    path = palm_path(trials, replay.true_state)
+    return float(path[:, 2].min() - taught[:, 2].min())

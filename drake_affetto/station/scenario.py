@@ -82,7 +82,7 @@ class DrumRegion:
             require_array(f"{where}[{i}]", corner, (2,))
         require(
             len(self.polygon) >= 3
-            and polygon_area(self.corners) > _LEAST_REGION
+            and bool(polygon_area(self.corners) > _LEAST_REGION)
             and not crosses_itself(self.corners),
             where,
             self.polygon,

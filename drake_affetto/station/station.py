@@ -1,4 +1,7 @@
-"""The one Diagram: robot, drum and mirror, and all that acts on them."""
+"""The one Diagram: robot, drum and mirror, and all that acts on them.
+
+Long: all wires of the Diagram stand side by side.
+"""
 
 from collections.abc import Sequence
 

@@ -15,7 +15,10 @@ from drake_affetto.station.station import AffettoStation
 
 @pytest.fixture(scope="module")
 def station():
-    return AffettoStation(load_scenario("drumming"))
+    """The robot as its model is, without the variation of trials."""
+    scenario = load_scenario("drumming")
+    scenario.variation.enabled = False
+    return AffettoStation(scenario)
 
 
 def port(station, context, name):
@@ -200,6 +203,7 @@ def test_shut_valves_hold_the_air_by_the_polytropic_law():
     """p Vⁿ stays in every chamber as unequal pressures move the arm."""
     scenario = load_scenario("drumming")
     scenario.motion_source = scenario.valve_source = "external"
+    scenario.variation.enabled = False
     station = AffettoStation(scenario)
     context = station.CreateDefaultContext()
     own = station.GetMutableSubsystemContext(station.actuation, context)
@@ -238,9 +242,7 @@ def test_who_teaches_by_mouse_needs_a_browser_to_do_it_in():
 
 @pytest.fixture(scope="module")
 def varying():
-    scenario = load_scenario("drumming")
-    scenario.variation.enabled = True
-    return AffettoStation(scenario)
+    return AffettoStation(load_scenario("drumming"))
 
 
 def settled(station, seed, duration=0.5):
