@@ -28,6 +28,7 @@ from drake_affetto.experiments.results import (
     TaughtPosition,
 )
 from drake_affetto.experiments.skills import (
+    best_constant,
     look_at_positions,
     make_skill,
     run_strikes,
@@ -38,7 +39,11 @@ from drake_affetto.experiments.skills import (
     teach_positions,
 )
 from drake_affetto.experiments.statistics import success_rate
-from drake_affetto.experiments.trials import draw_positions, trial_seed
+from drake_affetto.experiments.trials import (
+    Movement,
+    draw_positions,
+    trial_seed,
+)
 from drake_affetto.runner.executor import Spec, TrialExecutor
 from drake_affetto.sound.config import load_sound_config
 from drake_affetto.sound.separation import separation
@@ -46,7 +51,10 @@ from drake_affetto.station.scenario import Scenario, SkillConfig, load_scenario
 
 # What a seed of the study is for. Other studies that learn the same skill use
 # those of the demonstrations and the skill too.
-_TESTS, SOURCE, _ORDER, HIDDEN, _LOOKS, _STRIKES = range(6)
+_TESTS, SOURCE, _ORDER, HIDDEN, _TRIALS = range(5)
+
+# In place of an order: no skill at all, one and the same stroke everywhere.
+_BLIND = "blind"
 
 # A curve has reached its plateau at this rate or above.
 _PLATEAU = 0.9
@@ -57,7 +65,8 @@ class _Test:
     """One trial of the study.
 
     Attributes:
-        order: Order of the demonstrations, "random" or "active".
+        order: Order of the demonstrations, "random" or "active"; "blind" for
+            the best constant stroke.
         repeat: Number of the repeat.
         n: Number of demonstrations that the skill knows.
         position: Number of the test position.
@@ -123,16 +132,17 @@ def run_drum(executor: TrialExecutor, plan: DrumPlan) -> DrumResults:
         )
         for repeat in range(plan.repeats)
     ]
-    # The gaze does not depend on what was learned: one search serves all
-    # tests at a position.
+    # What the gaze finds does not depend on what was learned: one look tells
+    # it for all tests with that place and seed, each of which looks again.
     seen = look_at_positions(
         executor,
         "Looking at test positions",
         plan.scenario,
         [positions] * plan.repeats,
-        (plan.seed, _LOOKS),
+        (plan.seed, _TRIALS),
     )
     tests = _plan_tests(plan, scenario, demonstrations, positions, seen)
+    tests |= _plan_blind(plan, scenario, demonstrations, positions, seen)
     strikes = run_strikes(executor, "Drumming at test positions", tests)
     outcomes = [
         _Outcome(
@@ -143,7 +153,10 @@ def run_drum(executor: TrialExecutor, plan: DrumPlan) -> DrumResults:
         )
         for test in tests
     ]
-    return _make_results(plan, scenario, demonstrations, outcomes)
+    skilled = [each for each in outcomes if each.test.order != _BLIND]
+    results = _make_results(plan, scenario, demonstrations, skilled)
+    (blind,) = _curve(plan, (o for o in outcomes if o.test.order == _BLIND))
+    return dataclasses.replace(results, chance=blind.success_rate)
 
 
 def _plan_tests(
@@ -175,12 +188,34 @@ def _plan_tests(
                     tests[_Test(order, repeat, n, position)] = strike_if_seen(
                         plan.scenario,
                         xy,
-                        trial_seed(plan.seed, _STRIKES, repeat, position),
+                        trial_seed(plan.seed, _TRIALS, repeat, position),
                         seen[repeat, position],
                         skills[n - 1],
                         prototypes,
                     )
     return tests
+
+
+def _plan_blind(
+    plan: DrumPlan,
+    scenario: Scenario,
+    demonstrations: Sequence[Sequence[DemonstrationResult]],
+    positions: np.ndarray,
+    seen: dict[tuple[int, int], GazeResult],
+) -> dict[_Test, Spec | None]:
+    """The trials of each repeat's best constant stroke, played blind."""
+    return {
+        _Test(_BLIND, repeat, 0, position): strike_if_seen(
+            plan.scenario,
+            xy,
+            trial_seed(plan.seed, _TRIALS, repeat, position),
+            seen[repeat, position],
+            Movement(best_constant(known, scenario)),
+            stack_prototypes(known),
+        )
+        for repeat, known in enumerate(demonstrations)
+        for position, xy in enumerate(positions)
+    }
 
 
 def _orders(
@@ -308,7 +343,13 @@ def _make_results(
             float(np.mean([o.success for o in last])),
             [
                 EvaluatedPosition(
-                    o.test.repeat, o.xy, o.tau, o.reward, o.success, o.impulse
+                    o.test.repeat,
+                    o.xy,
+                    o.tau,
+                    o.reward,
+                    o.success,
+                    o.impulse,
+                    o.strike.landing if o.strike else None,
                 )
                 for o in last
             ],

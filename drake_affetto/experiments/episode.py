@@ -22,6 +22,7 @@ from drake_affetto.common.typing import Array
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.perception import gaze as gaze_state
 from drake_affetto.perception.gaze import GazePhase
+from drake_affetto.scene import world
 from drake_affetto.skill.policy import Regressor
 from drake_affetto.sound.config import load_sound_config
 from drake_affetto.sound.reward import (
@@ -106,6 +107,22 @@ class GuidedMovement:
     q: Array
     theta: Array
     max_pull: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Landing:
+    """Where the palm comes down.
+
+    Attributes:
+        distance: How far from the head's center, level with the table, the
+            palm is when its lowest point first is at the head's height, or
+            where it is lowest if it never gets so low, m.
+        graze: Whether it touches the head all the same although it comes down
+            beside it.
+    """
+
+    distance: float
+    graze: bool
 
 
 @dataclasses.dataclass(frozen=True)
@@ -337,7 +354,7 @@ class TrialRunner:
             The outcome of the gaze, and the recording (None if the drum was
             not found).
         """
-        outcome = self._look(xy, seed)
+        outcome = self.look(xy, seed)
         if not outcome.found:
             return outcome, None
         policy = self._sub(self.station.policy)
@@ -350,12 +367,16 @@ class TrialRunner:
         start = float(self.port("affetto.start_time")[0])
         return outcome, self._record(start, seed)
 
-    def _look(self, xy: Array, seed: int) -> GazeOutcome:
+    def look(self, xy: Array, seed: int) -> GazeOutcome:
         """The search for the drum, at whose end the station then is.
 
         It knows nothing of the movement that follows. So the station's state
         at the end of the last search is kept: further movements of the same
         trial go on from there, exactly as if the search came before each.
+
+        Args:
+            xy: Position of the drum (2,), m.
+            seed: Seed of the trial.
         """
         key = (float(xy[0]), float(xy[1]), seed)
         if self._looked is None or self._looked.key != key:
@@ -370,6 +391,33 @@ class TrialRunner:
         self._clear_logs()
         self.simulator.Initialize()
         return self._looked.outcome
+
+    def palm_path(self, state: Array) -> Array:
+        """Positions (T, 3) of the palm, m in the world.
+
+        Args:
+            state: Angles and speeds (T, 2n), rad and rad/s.
+        """
+        teacher = self.station.teacher
+        return np.array([teacher.palm(each)[0] for each in state])
+
+    def landing(self, recording: Recording) -> Landing:
+        """Where the palm came down in the trial that has just ended.
+
+        For judging only, by the true posture: neither learner nor reward know
+        of it.
+        """
+        plant = self.station.plant
+        context = self._sub(plant)
+        head = world.head_center_position(plant, context)
+        palm = self.palm_path(recording.true_state)
+        low = palm[:, 2] - world.hand_radius(plant, context)
+        down = low <= head[2]
+        at = int(np.argmax(down)) if down.any() else int(np.argmin(low))
+        distance = float(np.linalg.norm(palm[at, :2] - head[:2]))
+        touched = bool(np.any(recording.contact_force[:, 0] > 0.0))
+        beside = distance > world.head_radius(plant, context)
+        return Landing(distance, touched and beside)
 
     def port(self, name: str):
         """The value now of the station's output port `name`."""

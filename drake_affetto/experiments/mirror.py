@@ -25,6 +25,7 @@ from drake_affetto.experiments.results import (
     TransferMap,
 )
 from drake_affetto.experiments.skills import (
+    best_constant,
     fit_scheme,
     learn_skill,
     look_at_positions,
@@ -34,13 +35,30 @@ from drake_affetto.experiments.skills import (
     task_parameters,
     teach_positions,
 )
-from drake_affetto.experiments.statistics import compare, success_rate
-from drake_affetto.experiments.trials import draw_positions, trial_seed
+from drake_affetto.experiments.statistics import (
+    compare,
+    compare_landing,
+    correct_primary,
+    success_rate,
+)
+from drake_affetto.experiments.trials import (
+    Movement,
+    draw_positions,
+    trial_seed,
+)
 from drake_affetto.runner.executor import Spec, TrialExecutor
 from drake_affetto.station.scenario import load_scenario
 
 # What the seeds of this study are for; the skill's are those of the drum study.
-_TARGET, _TESTS, _CHOICE, _LOOKS, _STRIKES = range(100, 105)
+_TARGET, _TESTS, _CHOICE, _TRIALS = range(100, 104)
+
+# In place of a scheme: no skill at all, one and the same stroke everywhere.
+_BLIND = "blind"
+
+# What the study was made to decide, named before it was run: each transfer
+# against learning from scratch, with few samples, by success and by landing.
+PRIMARY_PAIRS = (("transfer_default", "relearn"), ("transfer", "relearn"))
+PRIMARY_SAMPLES = (2, 3)
 
 # Points along each side of the map's grid in the results.
 _GRID = 11
@@ -77,12 +95,14 @@ class _Repeat:
     Attributes:
         skill: Skill, learned in direct view.
         prototypes: Prototypes of the reward (N, bands, frames).
+        constant: Movement (F,) of the best constant stroke.
         pool: Demonstrations in the changed view.
         positions: Test positions (evaluations, 2), m.
     """
 
     skill: Any
     prototypes: np.ndarray
+    constant: np.ndarray
     pool: list[DemonstrationResult]
     positions: np.ndarray
 
@@ -157,13 +177,16 @@ def run_mirror(executor: TrialExecutor, plan: MirrorPlan) -> MirrorOutcome:
         f"Looking, {title}",
         plan.scenario,
         [each.positions for each in repeats],
-        (plan.seed, _LOOKS),
+        (plan.seed, _TRIALS),
     )
     # Each scheme with each number of samples strikes at all test positions.
     tests: dict[_Test, Spec | None] = {}
     shown: dict[str, Any] = {}
     shown_samples: list[DemonstrationResult] = []
     for number, repeat in enumerate(repeats):
+        movers: dict[tuple[str, int], Any] = {
+            (_BLIND, 0): Movement(repeat.constant)
+        }
         for count in plan.samples:
             chosen = choose(
                 task_parameters(repeat.pool),
@@ -173,19 +196,20 @@ def run_mirror(executor: TrialExecutor, plan: MirrorPlan) -> MirrorOutcome:
             )
             samples = [repeat.pool[i] for i in chosen]
             schemes = _fit_schemes(plan, repeat.skill, samples)
+            movers |= {(name, count): each for name, each in schemes.items()}
             if number == 0 and count == max(plan.samples):
                 shown, shown_samples = schemes, samples
-            for name, scheme in schemes.items():
-                for position, xy in enumerate(repeat.positions):
-                    test = _Test(name, count, number, position)
-                    tests[test] = strike_if_seen(
-                        plan.scenario,
-                        xy,
-                        trial_seed(plan.seed, _STRIKES, number, position),
-                        seen[number, position],
-                        scheme,
-                        repeat.prototypes,
-                    )
+        # Place by place: trials of one place and seed share the search.
+        for position, xy in enumerate(repeat.positions):
+            for (name, count), mover in movers.items():
+                tests[_Test(name, count, number, position)] = strike_if_seen(
+                    plan.scenario,
+                    xy,
+                    trial_seed(plan.seed, _TRIALS, number, position),
+                    seen[number, position],
+                    mover,
+                    repeat.prototypes,
+                )
     outcomes = run_strikes(executor, f"Drumming, {title}", tests)
     first = repeats[0]
     return MirrorOutcome(
@@ -229,6 +253,7 @@ def _teach(
             trial_seed(plan.seed, HIDDEN, repeat),
         ),
         prototypes=stack_prototypes(demonstrations),
+        constant=best_constant(demonstrations, load_scenario(plan.direct)),
         pool=pool,
         positions=draw_positions(
             load_scenario(plan.scenario),
@@ -246,7 +271,7 @@ def _fit_schemes(
     tau = task_parameters(samples)
     theta = np.array([each.theta for each in samples])
     return {
-        name: fit_scheme(name, skill, tau, theta, plan.scenario)
+        name: fit_scheme(name, skill, tau, theta, plan.scenario, plan.direct)
         for name in plan.schemes
     }
 
@@ -261,29 +286,58 @@ def _make_results(
     for count in plan.samples:
         # Tables (repeats, test positions).
         successes: dict[str, np.ndarray] = {}
+        landings: dict[str, np.ndarray] = {}
         for name in plan.schemes:
-            strikes = [
-                [
-                    outcomes[_Test(name, count, repeat, position)]
-                    for position in range(plan.evaluations)
-                ]
-                for repeat in range(plan.repeats)
-            ]
-            successes[name] = np.array(
-                [[s.success if s else False for s in row] for row in strikes],
-                dtype=float,
+            strikes = _table(plan, outcomes, name, count)
+            flat = [strike for row in strikes for strike in row]
+            successes[name] = _successes(strikes)
+            landings[name] = np.array(
+                [[s.landing if s else np.nan for s in row] for row in strikes]
             )
             schemes.setdefault(name, {})[count] = SchemeCell(
                 success_rate(successes[name]),
                 successes[name].mean(axis=1).tolist(),
-                [s.reward if s else 0.0 for row in strikes for s in row],
+                [s.reward if s else 0.0 for s in flat],
+                [s.landing if s else None for s in flat],
+                float(np.mean([s.graze if s else False for s in flat])),
             )
         comparisons += compare(successes, count)
+        comparisons += [
+            compare_landing(landings, pair, count)
+            for pair in PRIMARY_PAIRS
+            if set(pair) <= set(landings)
+        ]
     return MirrorResults.of(
         plan,
         schemes=schemes,
-        comparisons=comparisons,
+        comparisons=correct_primary(
+            comparisons, PRIMARY_PAIRS, PRIMARY_SAMPLES
+        ),
         map=example,
+        chance=success_rate(_successes(_table(plan, outcomes, _BLIND, 0))),
+    )
+
+
+def _table(
+    plan: MirrorPlan,
+    outcomes: Mapping[_Test, StrikeResult | None],
+    name: str,
+    count: int,
+) -> list[list[StrikeResult | None]]:
+    """The strikes of a scheme: a row a repeat, a column a test position."""
+    return [
+        [
+            outcomes[_Test(name, count, repeat, position)]
+            for position in range(plan.evaluations)
+        ]
+        for repeat in range(plan.repeats)
+    ]
+
+
+def _successes(strikes: Sequence[Sequence[StrikeResult | None]]) -> np.ndarray:
+    return np.array(
+        [[s.success if s else False for s in row] for row in strikes],
+        dtype=float,
     )
 
 

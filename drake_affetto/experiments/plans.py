@@ -93,12 +93,12 @@ class MirrorPlan(Plan):
 
     scenario: str = "mirror"
     samples: tuple[int, ...] = number(
-        (3, 4, 5), 2, 100, "numbers of demonstrations that schemes are given"
+        (2, 3, 4, 5), 2, 100, "numbers of demonstrations that schemes are given"
     )
     repeats: int = number(
-        10, 1, 1000, "independent repeats, each with another skill and teacher"
+        20, 1, 1000, "independent repeats, each with another skill and teacher"
     )
-    evaluations: int = number(6, 1, 1000, "number of test positions a repeat")
+    evaluations: int = number(8, 1, 1000, "number of test positions a repeat")
     demonstrations: int = number(
         25, 3, 1000, "number of demonstrations in direct view"
     )

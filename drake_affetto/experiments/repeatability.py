@@ -61,7 +61,7 @@ def measure_repeatability(
         ),
         lowest=np.array(
             [
-                palm_path(trials, each.true_state)[:, 2].min()
+                trials.palm_path(each.true_state)[:, 2].min()
                 for each in recordings
             ]
         ),
@@ -86,17 +86,6 @@ def best_lag(t: Array, desired: Array, q: Array, longest: float = 0.6) -> float:
     return float(np.argmin(errors) * step)
 
 
-def palm_path(trials: TrialRunner, state: Array) -> Array:
-    """Positions (T, 3) of the palm, m in the world.
-
-    Args:
-        trials: Runner whose robot it is.
-        state: Angles and speeds (T, 2n), rad and rad/s.
-    """
-    teacher = trials.station.teacher
-    return np.array([teacher.palm(each)[0] for each in state])
-
-
 def replay_depth(trials: TrialRunner, xy: Array, seed: int) -> float:
     """How much higher a free replay's lowest point is than the taught one, m.
 
@@ -110,7 +99,7 @@ def replay_depth(trials: TrialRunner, xy: Array, seed: int) -> float:
     """
     xy = np.asarray(xy, float)
     guided = trials.teach(xy, seed)
-    taught = palm_path(trials, np.hstack([guided.q, np.zeros_like(guided.q)]))
+    taught = trials.palm_path(np.hstack([guided.q, np.zeros_like(guided.q)]))
     low, high = world.drum_limits(
         trials.station.plant,
         trials.station.plant.GetMyContextFromRoot(trials.context),
@@ -120,5 +109,5 @@ def replay_depth(trials: TrialRunner, xy: Array, seed: int) -> float:
     ]
     away = max(corners, key=lambda each: float(np.linalg.norm(each - xy)))
     replay = trials.strike(away, guided.theta, seed + 1)
-    path = palm_path(trials, replay.true_state)
+    path = trials.palm_path(replay.true_state)
     return float(path[:, 2].min() - taught[:, 2].min())

@@ -17,6 +17,7 @@ from drake_affetto.experiments.episode import Recording, TrialRunner
 from drake_affetto.experiments.results.trial import TrialResult
 from drake_affetto.experiments.tables import open_store
 from drake_affetto.experiments.trials import (
+    Movement,
     check_scenario,
     replay_seed,
     run_trial,
@@ -168,7 +169,7 @@ def _record(trials: TrialRunner, spec: Spec) -> Recording | None:
     kind, seed = spec["kind"], spec["seed"]
     xy = np.array(spec["xy"])
     if kind == "strike":
-        return trials.strike(xy, spec["theta"], seed)
+        return trials.drum(xy, Movement(spec["theta"]), seed)[1]
     if kind == "demonstration":
         done: Any = run_trial(spec)
         if done.success:

@@ -21,8 +21,9 @@ from drake_affetto.experiments.trials import (
     strike,
     trial_seed,
 )
+from drake_affetto.geometry.region import grid_inside
 from drake_affetto.runner.executor import Key, Spec, TrialExecutor
-from drake_affetto.station.scenario import SkillConfig, load_scenario
+from drake_affetto.station.scenario import Scenario, SkillConfig, load_scenario
 
 if TYPE_CHECKING:
     from drake_affetto.skill.elm import ElmRegressor
@@ -33,6 +34,11 @@ if TYPE_CHECKING:
 
 # The least that a skill can be learned from.
 _FEWEST = 3
+
+# A palm still sounds a drum of 8 cm from about so far beside its center, m;
+# and points along the region's box by which the best constant is chosen.
+_CHANCE_REACH = 0.05
+_CHANCE_GRID = 41
 
 
 def make_skill(config: SkillConfig, seed: int) -> "ElmRegressor":
@@ -208,7 +214,7 @@ def strike_if_seen(
     Args:
         scenario: Scenario, by name or path.
         xy: Position of the drum (2,), m.
-        seed: Seed of the noise.
+        seed: Seed of the trial; that of the look.
         gaze: What the gaze found there.
         skill: Fitted regressor from τ to θ.
         prototypes: Prototypes of the reward (N, bands, frames).
@@ -236,12 +242,33 @@ def run_strikes(
     return {test: strikes.get(test) for test in tests}
 
 
+def best_constant(
+    demonstrations: Sequence[DemonstrationResult], scenario: Scenario
+) -> np.ndarray:
+    """The demonstrated movement (F,) that suits most places of the drum.
+
+    Played blind it is the chance level: what is reached by a robot that has
+    learned nothing of where the drum is. It is chosen by the true places, so
+    chance is not taken to be smaller than it is.
+
+    Args:
+        demonstrations: Successful demonstrations.
+        scenario: Scenario with the drum's region.
+    """
+    places = grid_inside(scenario.drum_region.corners, _CHANCE_GRID)
+    taught = np.array([each.xy for each in demonstrations])
+    away = np.linalg.norm(places[:, None] - taught, axis=-1)
+    served = (away < _CHANCE_REACH).sum(axis=0)
+    return demonstrations[int(np.argmax(served))].theta
+
+
 def fit_scheme(
     name: str,
     source: "ElmRegressor",
     tau: np.ndarray,
     theta: np.ndarray,
     scenario: str,
+    direct: str,
 ) -> Any:
     """One scheme of the paper's comparison, fitted to what is new.
 
@@ -251,6 +278,7 @@ def fit_scheme(
         tau: (N, 2) task parameters in the new condition.
         theta: (N, F) demonstrated there.
         scenario: of the new condition, by name or path.
+        direct: in which the skill was learned, by name or path.
 
     Returns:
         A fitted regressor from τ̂ to θ.
@@ -264,25 +292,22 @@ def fit_scheme(
     scheme = make_scheme(name, source, input_range=loaded.skill.input_range)
     if name == "transfer_default":
         scheme.set_params(
-            mapping=_mapping(scenario, loaded.transfer.mapping),
+            mapping=_mapping(scenario, direct, loaded.transfer.mapping),
             residual="smooth" if loaded.transfer.residual else None,
         )
     return scheme.fit(tau, theta)
 
 
 @functools.cache
-def _mapping(scenario: str, name: str) -> "str | MapFamily":
+def _mapping(scenario: str, direct: str, name: str) -> "str | MapFamily":
     """The family of maps that a scenario names."""
     if name != "optical":
         return name
     from drake_affetto.experiments.view_maps import (
-        REFERENCE,
         ViewDomain,
         make_optical_map,
     )
     from drake_affetto.skill.optical import OpticalMapping
 
-    optical = make_optical_map(
-        ViewDomain.of(scenario), ViewDomain.of(REFERENCE)
-    )
+    optical = make_optical_map(ViewDomain.of(scenario), ViewDomain.of(direct))
     return OpticalMapping(**vars(optical))

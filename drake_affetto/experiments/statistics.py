@@ -114,6 +114,61 @@ def cohens_h(first: float, second: float) -> float:
     return float(a - b)
 
 
+def compare_landing(
+    landings: Mapping[str, np.ndarray], pair: tuple[str, str], samples: int
+) -> SchemeComparisonRow:
+    """Compares where the strokes of two schemes land.
+
+    Args:
+        landings: By scheme, distances from the head's center (repeats,
+            trials), m; NaN without a stroke. Trials correspond as in
+            `compare`.
+        pair: The two schemes.
+        samples: Number of samples that they were given, for the record.
+    """
+    first, second = (np.nanmedian(landings[name], axis=1) for name in pair)
+    known = np.isfinite(first) & np.isfinite(second)
+    first, second = first[known], second[known]
+    return SchemeComparisonRow(
+        a=pair[0],
+        b=pair[1],
+        samples=samples,
+        difference=float(np.mean(first - second)) if known.any() else 0.0,
+        p=paired_p(first, second) if known.any() else None,
+        p_corrected=None,
+        measure="landing",
+    )
+
+
+def correct_primary(
+    rows: Sequence[SchemeComparisonRow],
+    pairs: Sequence[tuple[str, str]],
+    samples: Sequence[int],
+) -> list[SchemeComparisonRow]:
+    """Marks the comparisons named beforehand; corrects them among themselves.
+
+    Args:
+        rows: Of all pairs, measures and numbers of samples.
+        pairs: The pairs named beforehand, in either order.
+        samples: The numbers of samples named beforehand.
+    """
+    named = {frozenset(pair) for pair in pairs}
+    primary = [
+        i
+        for i, row in enumerate(rows)
+        if frozenset((row.a, row.b)) in named
+        and row.samples in samples
+        and row.p is not None
+    ]
+    corrected = holm([float(rows[i].p or 0.0) for i in primary])
+    marked = list(rows)
+    for i, value in zip(primary, corrected, strict=True):
+        marked[i] = dataclasses.replace(
+            rows[i], p_corrected=value, primary=True
+        )
+    return marked
+
+
 def compare(
     successes: Mapping[str, np.ndarray], samples: int
 ) -> list[SchemeComparisonRow]:

@@ -6,7 +6,8 @@ rest determines the trial, including seeds. The kinds are
     look           the gaze searches for the drum
     demonstration  the gaze, then a teacher who repeats the movement until the
                    robot's own replay makes the drum sound
-    strike         a movement with given parameters, without the gaze
+    strike         the whole chain with what a skill says given: gaze,
+                   movement, sound
     drumming       the whole chain: gaze, skill, movement, sound
 
 and `drake_affetto.experiments.results` has the result of each.
@@ -154,15 +155,17 @@ def strike(
     theta: np.ndarray,
     prototypes: np.ndarray,
 ) -> Spec:
-    """The spec of a movement with the drum at xy, judged by its sound.
+    """The spec of the chain with the drum at xy and a given movement.
 
-    This is what `drumming` does once the drum has been found. So one search
-    serves all movements that are tried at one position.
+    It is `drumming` with a skill that has been asked already: for what a
+    `look` there, with this seed, finds. Movements that are tried one after
+    another with the same place and seed share the search, see
+    `TrialRunner.look`.
 
     Args:
         scenario: Scenario, by name or path.
         xy: Position of the drum (2,), m.
-        seed: Seed of the noise.
+        seed: Seed of the trial; that of the look.
         theta: Parameters of the movement (F,).
         prototypes: Prototypes of the reward (N, bands, frames).
     """
@@ -200,6 +203,21 @@ def drumming(
         regressor=regressor,
         prototypes=list(prototypes),
     )
+
+
+@dataclasses.dataclass(frozen=True)
+class Movement:
+    """What a skill says where it has been asked already.
+
+    Attributes:
+        theta: Parameters of the movement (F,).
+    """
+
+    theta: np.ndarray
+
+    def predict(self, tau: np.ndarray) -> np.ndarray:
+        """θ (N, F) for τ (N, d), the same for all."""
+        return np.tile(np.asarray(self.theta, dtype=float), (len(tau), 1))
 
 
 def run_trial(
@@ -358,18 +376,27 @@ def _run_drumming(trials: TrialRunner, spec: Spec) -> DrummingResult:
 
 
 def _run_look(trials: TrialRunner, spec: Spec) -> GazeResult:
-    gaze = trials.gaze(np.array(spec["xy"]), spec["seed"])
+    gaze = trials.look(np.array(spec["xy"]), spec["seed"])
     return GazeResult(gaze.found, gaze.task_parameter.tolist(), gaze.duration)
 
 
 def _run_strike(trials: TrialRunner, spec: Spec) -> StrikeResult:
-    recording = trials.strike(np.array(spec["xy"]), spec["theta"], spec["seed"])
+    xy = np.array(spec["xy"])
+    gaze, recording = trials.drum(xy, Movement(spec["theta"]), spec["seed"])
+    if recording is None:
+        raise InputError(
+            f"the drum at {xy.round(3).tolist()} is not found, so there is no "
+            "strike at it"
+        )
     trace = reward_over_time(trials.spectrogram(recording), spec["prototypes"])
     value = trials.reward(recording, spec["prototypes"])
+    landing = trials.landing(recording)
     return StrikeResult(
         reward=value,
         success=bool(value > trials.reward_config.threshold),
         **_contact(recording),
+        landing=landing.distance,
+        graze=landing.graze,
         reward_over_time=trace.astype(np.float32),
     )
 

@@ -456,6 +456,12 @@ def drum_radius(plant: MultibodyPlant, context: Context) -> float:
     return max(shape.radius() for _, shape in shapes)
 
 
+def head_radius(plant: MultibodyPlant, context: Context) -> float:
+    """Radius [m] of the drum's head, as far as it can be struck."""
+    shapes = _shapes(plant, context, plant.GetBodyByName("head"), Cylinder)
+    return max(shape.radius() for _, shape in shapes)
+
+
 def hand_radius(plant: MultibodyPlant, context: Context) -> float:
     """Radius [m] of the soft right hand, about the palm's frame."""
     body = plant.GetBodyByName("right_hand")

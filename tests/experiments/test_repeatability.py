@@ -7,7 +7,6 @@ from drake_affetto.experiments.episode import TrialRunner
 from drake_affetto.experiments.repeatability import (
     best_lag,
     measure_repeatability,
-    palm_path,
     replay_depth,
 )
 from drake_affetto.station.scenario import load_scenario
@@ -64,7 +63,7 @@ def test_palm_path_starts_where_the_palm_is(trials):
     context = plant.GetMyContextFromRoot(trials.context)
     p_W = plant.GetFrameByName("right_palm").CalcPoseInWorld(context)
     np.testing.assert_allclose(
-        palm_path(trials, recording.true_state[-1:])[0],
+        trials.palm_path(recording.true_state[-1:])[0],
         p_W.translation(),
         atol=1e-3,
     )

@@ -80,11 +80,14 @@ class EvaluatedPosition(_Seen):
         reward: Reward from the sound.
         success: Whether the reward is above the threshold.
         contact_impulse: Impulse on the drum's head, N s.
+        landing: Distance from the head's center at which the palm comes
+            down, m; None where nothing was struck.
     """
 
     reward: float
     success: bool
     contact_impulse: float | None
+    landing: float | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -182,6 +185,7 @@ class DrumResults(StudyResults):
         separation: How well the reward tells hits from misses.
         rewards: Reward and contact of all trials.
         similarity: Examples of Fig. 3b; None without both a hit and a miss.
+        chance: Success of the best constant stroke, played blind.
     """
 
     KIND: ClassVar[str] = "drum"
@@ -199,6 +203,7 @@ class DrumResults(StudyResults):
     separation: RewardEvaluation
     rewards: list[RewardRow]
     similarity: SimilarityTraces | None = None
+    chance: SuccessRate | None = None
 
     def check(self, where: str) -> None:
         """Raises InputError where parts do not fit each other."""

@@ -23,11 +23,17 @@ class SchemeCell:
         success_rate: Success at the test positions.
         per_repeat: Share of successes in each repeat.
         rewards: Reward of each trial.
+        landing: Distance from the head's center at which the palm comes down
+            in each trial, m; None where nothing was struck.
+        grazes: Share of trials in which the head sounds although the palm
+            comes down beside it.
     """
 
     success_rate: SuccessRate
     per_repeat: list[float] = field(default_factory=list)
     rewards: list[float] = field(default_factory=list)
+    landing: list[float | None] = field(default_factory=list)
+    grazes: float | None = None
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -42,6 +48,8 @@ class SchemeComparisonRow:
         p: p value of "neither is better".
         effect_size: Cohen's h.
         p_corrected: p value, corrected for the number of comparisons.
+        measure: What is compared, "success" or "landing", m.
+        primary: Whether this comparison was named before the study.
     """
 
     a: str
@@ -51,6 +59,8 @@ class SchemeComparisonRow:
     p: float | None = None
     effect_size: float | None = None
     p_corrected: float | None
+    measure: str = "success"
+    primary: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,6 +124,7 @@ class MirrorResults(StudyResults):
         schemes: Results by scheme and number of samples.
         comparisons: Paired tests of the schemes.
         map: The map of the first repeat; None if no scheme found one.
+        chance: Success of the best constant stroke, played blind.
     """
 
     KIND: ClassVar[str] = "mirror"
@@ -129,6 +140,7 @@ class MirrorResults(StudyResults):
     schemes: dict[str, dict[int, SchemeCell]] = field(metadata=NOT_EMPTY)
     comparisons: list[SchemeComparisonRow]
     map: TransferMap | None = None
+    chance: SuccessRate | None = None
 
     def check(self, where: str) -> None:
         """Raises InputError where parts do not fit each other."""

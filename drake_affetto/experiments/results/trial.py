@@ -68,6 +68,9 @@ class StrikeResult:
         success: Whether the reward is above the threshold.
         max_force: Greatest force on the drum's head, N.
         impulse: Impulse on the drum's head, N s.
+        landing: Distance from the head's center at which the palm comes down
+            to its height, m.
+        graze: Whether it touches the head although it comes down beside it.
         reward_over_time: (frames,) similarity to the prototypes as they
             slide over the recording.
     """
@@ -79,6 +82,8 @@ class StrikeResult:
     success: bool
     max_force: float
     impulse: float
+    landing: float
+    graze: bool
     reward_over_time: np.ndarray
 
 
