@@ -382,7 +382,7 @@ def _run_look(trials: TrialRunner, spec: Spec) -> GazeResult:
 
 def _run_strike(trials: TrialRunner, spec: Spec) -> StrikeResult:
     xy = np.array(spec["xy"])
-    gaze, recording = trials.drum(xy, Movement(spec["theta"]), spec["seed"])
+    _, recording = trials.drum(xy, Movement(spec["theta"]), spec["seed"])
     if recording is None:
         raise InputError(
             f"the drum at {xy.round(3).tolist()} is not found, so there is no "
