@@ -48,7 +48,7 @@ _REVISION = 3
 N_SOURCE = 20
 N_TRAIN = 14
 N_TARGET = 20
-N_LABELLED = 5
+N_LABELED = 5
 
 # The ELM of all squares: `weight_scale` (its inputs are not scaled) and ridge.
 WEIGHT_SCALE = 5.0
@@ -225,7 +225,7 @@ def subset(seed: int, repeat: int) -> NDArray[np.bool_]:
     """(20,), which target points have known values in that repeat."""
     random = np.random.default_rng([seed, 1, repeat])
     chosen = np.zeros(N_TARGET, dtype=bool)
-    chosen[random.permutation(N_TARGET)[:N_LABELLED]] = True
+    chosen[random.permutation(N_TARGET)[:N_LABELED]] = True
     return chosen
 
 
