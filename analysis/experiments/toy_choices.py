@@ -1,6 +1,6 @@
 """How the toy experiment's free choices were made, on seeds of no report.
 
-    python analysis/experiments/toy_choices.py [--seeds 12] [--repeats 8]
+    python analysis/experiments/toy_choices.py [--seeds 12] [--repeats 40]
         [--first-seed 1000] [--only source|squares|starts|prior ...]
 
 Prints, as medians over the seeds of means over the choices of five points
@@ -166,7 +166,7 @@ def main() -> None:
     """Prints the tables asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=12)
-    parser.add_argument("--repeats", type=int, default=8)
+    parser.add_argument("--repeats", type=int, default=40)
     parser.add_argument("--first-seed", type=int, default=1000)
     parser.add_argument("--only", nargs="+", choices=list(CHOICES))
     args = parser.parse_args()
