@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_output_argument(parser, "out/tune")
     add_seed_argument(parser, "seed of the search")
     parser.add_argument(
-        "--scenario", default="drumming", help="scenario of the robot"
+        "--scenario", default="easy_drumming", help="scenario of the robot"
     )
     parser.add_argument(
         "--start",

@@ -458,7 +458,8 @@ def drum_radius(plant: MultibodyPlant, context: Context) -> float:
 
 def head_radius(plant: MultibodyPlant, context: Context) -> float:
     """Radius [m] of the drum's head, as far as it can be struck."""
-    shapes = _shapes(plant, context, plant.GetBodyByName("head"), Cylinder)
+    body = plant.GetFrameByName("head_center").body()
+    shapes = _shapes(plant, context, body, Cylinder)
     return max(shape.radius() for _, shape in shapes)
 
 

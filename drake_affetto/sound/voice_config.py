@@ -25,7 +25,7 @@ class MembraneConfig:
             vibrations.
     """
 
-    radius: float = number(0.065, 1e-3, 1.0)
+    radius: float = number(0.04, 1e-3, 1.0)
     surface_density: float = number(0.26, 1e-3, math.inf)
     tension: float = number(200.0, 1e-3, math.inf)
     orders: int = number(5, 1, 20)
@@ -96,10 +96,10 @@ class HissConfig:
 
 def _shell_default() -> BodyConfig:
     return BodyConfig(
-        frequencies=[670.0, 1260.0, 1900.0],
+        frequencies=[1770.0, 3330.0, 5020.0],
         qualities=[15.0, 15.0, 12.0],
-        masses=[0.12, 0.12, 0.1],
-        area=0.015,
+        masses=[0.074, 0.074, 0.062],
+        area=0.0092,
         coupling=1e-4,
     )
 

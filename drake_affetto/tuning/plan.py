@@ -25,14 +25,15 @@ class TunePlan:
         joints: Joints whose gains are searched; the others keep those of
             `start`.
         seed: Seed of the search.
-        scenario: Name or file of the scenario.
+        scenario: Name or file of the scenario; that of a robot which repeats
+            itself, unless another is asked for.
         start: YAML file of the gains that the search starts from.
         tuning: YAML file of `TuningConfig`.
     """
 
     joints: tuple[str, ...]
     seed: int = 0
-    scenario: str = "drumming"
+    scenario: str = "easy_drumming"
     start: str = START_FILE
     tuning: str = DEFAULT_FILE
 
@@ -46,7 +47,7 @@ def load_plan(
     joints: Sequence[str] | None,
     *,
     seed: int = 0,
-    scenario: str = "drumming",
+    scenario: str = "easy_drumming",
     start: str = START_FILE,
     tuning: str = DEFAULT_FILE,
 ) -> TunePlan:
@@ -55,7 +56,8 @@ def load_plan(
     Args:
         joints: Active joints of the scenario; None for all of them.
         seed: Seed of the search.
-        scenario: Name or file of the scenario.
+        scenario: Name or file of the scenario; that of a robot which repeats
+            itself, unless another is asked for.
         start: YAML file of the gains that the search starts from.
         tuning: YAML file of `TuningConfig`.
 

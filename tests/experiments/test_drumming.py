@@ -141,7 +141,7 @@ def test_a_curve_of_some_points_is_part_of_the_whole(tmp_path, results):
 def test_active_order_asks_for_what_leaves_it_most_certain():
     config = load_scenario("drumming").skill
     rng = np.random.default_rng(0)
-    tau = rng.uniform([0.0, -0.5], [1.0, 0.5], size=(20, 2))
+    tau = rng.uniform([0.0, -0.76], [1.0, 0.76], size=(20, 2))
     order = active_order(config, tau, 7, seed=3)
     assert sorted(order) == list(range(20))
     assert order[0] == 7

@@ -163,13 +163,17 @@ def test_a_scenario_says_which_map_is_learned(tmp_path):
     skill.fit(X, np.hstack([X, X**2]))
     few = X[:4]
     y = skill.predict(few)
-    scheme = fit_scheme("transfer_default", skill, few, y, str(path))
+    scheme = fit_scheme(
+        "transfer_default", skill, few, y, str(path), "drumming"
+    )
     assert scheme.mapping == "similarity"
     assert scheme.residual is None
     path.write_text(
         "extends: mirror\ntransfer: {mapping: affine, residual: true}\n"
     )
-    scheme = fit_scheme("transfer_default", skill, few, y, str(path))
+    scheme = fit_scheme(
+        "transfer_default", skill, few, y, str(path), "drumming"
+    )
     assert scheme.residual_ is not None
     path.write_text("extends: mirror\ntransfer: {mapping: afine}\n")
     with pytest.raises(InputError, match=r"transfer\.mapping is 'afine'"):

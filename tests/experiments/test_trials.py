@@ -92,7 +92,7 @@ def test_a_smaller_workspace_lies_in_the_middle():
         trials.draw_positions(scenario, 64, np.random.default_rng(0), share)
         for share in (1.0, 0.5)
     )
-    middle = np.array([scenario.drum_region.x, scenario.drum_region.y]).mean(1)
+    middle = scenario.drum_region.middle
     np.testing.assert_allclose(half - middle, 0.5 * (whole - middle))
 
 
@@ -141,7 +141,7 @@ def test_runners_can_be_handed_in():
     """For trials that are watched, for instance."""
 
     class Watched:
-        def gaze(self, xy, seed):
+        def look(self, xy, seed):
             return GazeOutcome(True, np.array([0.25, seed]), 1.5)
 
     found = trials.run_trial(
@@ -153,16 +153,14 @@ def test_runners_can_be_handed_in():
 def test_positions_fill_the_region_and_depend_on_the_seed():
     scenario = load_scenario("drumming")
     region = scenario.drum_region
-    low = np.array([region.x[0], region.y[0]])
-    high = np.array([region.x[1], region.y[1]])
     for count in (1, 5, 12):
         first = trials.draw_positions(scenario, count, np.random.default_rng(1))
         assert first.shape == (count, 2)
-        assert np.all((first >= low) & (first <= high))
+        assert np.all(region.contains(first))
         again = trials.draw_positions(scenario, count, np.random.default_rng(1))
         np.testing.assert_array_equal(first, again)
         other = trials.draw_positions(scenario, count, np.random.default_rng(2))
         assert not np.array_equal(first, other)
-    # Spread: each quarter of the region has some of 12.
-    cells = ((first - low) / (high - low) > 0.5) @ [1, 2]
+    # Spread: each quarter about the middle has some of 12.
+    cells = (first > region.middle) @ [1, 2]
     assert set(cells.tolist()) == {0, 1, 2, 3}

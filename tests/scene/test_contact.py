@@ -107,7 +107,7 @@ def test_contact_follows_the_drum(scene):
 
 
 def test_the_rim_is_the_shell_s(scene):
-    press(scene, 0.006, [XY[0] + 0.062, XY[1]])
+    press(scene, 0.006, [XY[0] + 0.038, XY[1]])
     found = forces(scene)
     rim = frozenset(["affetto::right_hand", "drum::shell"])
     assert found[rim] > 1.0

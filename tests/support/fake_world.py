@@ -58,6 +58,8 @@ def run(spec):
         "success": reward > 0.15,
         "max_force": 4.0,
         "impulse": 1.0 if miss < REACH else 0.0,
+        "landing": float(miss),
+        "graze": bool(0.8 * REACH < miss < REACH),
     }
     course = np.linspace(0.0, reward, 7, dtype=np.float32)
     return result, {"reward_over_time": course}
