@@ -6,7 +6,7 @@
 Draws, for one seed and one choice of five points, what the ELM predicts (as
 colors between black contours of the truth, which the predictions should
 follow): (a) where it has learned, (b) on the turned square, (c) there, through
-the map h of the default transfer, and beside it of the paper's single start.
+the map h of the default transfer, and beside it of the paper's way.
 With `--results`, the folder of an `affetto toy`, the lowest row shows how the
 errors on the other points are distributed over all seeds. Writes fig2_toy.png.
 """
@@ -53,7 +53,7 @@ def panel(axes, X, values, truth, levels, title, points, labeled):
 def maps(figure, domain, seed, repeat):
     """Panels a, b, c, and c as the paper does it."""
     problem = toy.make_problem(domain, seed)
-    known = toy.subset(domain, seed, repeat)
+    known = toy.subset(seed, repeat)
     Z, turned = grid(domain.low, domain.high, toy.TURN)
     truth = toy.toy_function(Z)
     levels = np.linspace(truth.min(), truth.max(), 19)
@@ -62,8 +62,8 @@ def maps(figure, domain, seed, repeat):
     with warnings.catch_warnings():
         # Five points, six parameters: that is the experiment.
         warnings.simplefilter("ignore", UserWarning)
-        for name in ("default", "paper_single_start"):
-            transfer = toy.make_transfer(name, problem.source)
+        for name in ("default", "paper"):
+            transfer = toy.make_transfer(name, problem.source, repeat)
             fitted[name] = transfer.fit(X, y).predict(turned)
     source = problem.source
     panels = [
@@ -83,9 +83,9 @@ def maps(figure, domain, seed, repeat):
             X,
         ),
         (
-            "(c') the paper's single start",
+            "(c') after the paper's way",
             turned,
-            fitted["paper_single_start"],
+            fitted["paper"],
             problem.X_target[~known],
             X,
         ),
@@ -120,7 +120,7 @@ def distributions(figure, results):
         a.set_title(f"{square}: dots seeds, lines medians", fontsize=10)
         a.grid(axis="x", alpha=0.3)
     paper = results["paper"]["transfer"]["other_mse_mean"]
-    axes[0].axvline(paper, ls="--", c="gray", label="paper, its own function")
+    axes[0].axvline(paper, ls="--", c="gray", label="paper")
     axes[0].legend(fontsize=8)
     axes[0].set_yticks(
         range(len(names)), [label for _, label in names.values()], fontsize=8

@@ -1,26 +1,26 @@
 """The toy experiment: transfer on a function of two inputs (paper, Sec. IV).
 
-An ELM learns a function on a square. The square is then turned by half a
-turn, so that the ELM is asked where it has learned nothing; from five points
-with known values a map h is found through which it serves again (Eq. 5), and
-judged on the other points. That is repeated with other five points, and all
-of it with other data and other hidden layers.
+An ELM learns Eq. 6 from 14 of 20 points of a square; the other 6 test it.
+20 new points are turned by half a turn, so that the ELM is asked where it has
+learned nothing. From 5 of them, with known values, a map h is found through
+which it serves again (Eq. 5); the other 15 judge it. That is repeated with
+other five points, and all of it with other data and other hidden layers.
 
-The paper does not print the square, and its function (Eq. 6), the turn and
-the number of points were not at hand. They are stand-ins here: of the simple
-functions that were tried this one agrees best with all figures known of the
-experiment - the paper's (train 0.00, test 0.06, turned 41.71) and those of a
-linear regression and an ELM from scratch on the five points, on two squares.
-So compare the methods with each other, and with the paper the orders of
-magnitude. `toy_function`, `TURN` and `DOMAINS` are all there is to exchange.
+What the paper does not print is chosen on seeds from 1000 on, which no report
+uses, by `analysis/experiments/toy_choices.py`:
 
-Hyper-parameters (the weights of the prior, λ, the noise) were chosen on seeds
-that no report uses.
+- the square: on [0, 1]² the figures before transfer are those of the paper;
+- the spread of the ELM's weights: 5 gives the paper's test error in the mean;
+- where the search for h begins, and λ: from the identity alone it gets stuck
+  and misses the five points, which the paper fits to 0.001. The best of three
+  random starts with λ = 0.001 comes to its figures: so we read it. The
+  identity alone is shown beside it.
+
+The weights of the default's prior are those that the robot's transfer has too.
 """
 
 from collections.abc import Iterable
 import dataclasses
-import math
 from typing import Any, TypeVar
 import warnings
 
@@ -41,46 +41,46 @@ from drake_affetto.runner.executor import Result, Spec, TrialExecutor
 T = TypeVar("T", ToySource, ToyMethod)
 
 # Counted up whenever the same seed gives other numbers than before.
-_REVISION = 2
+_REVISION = 4
+
+
+# The paper's numbers of points.
+N_SOURCE = 20
+N_TRAIN = 14
+N_TARGET = 20
+N_LABELED = 5
+
+# The ELM of all squares: `weight_scale` (its inputs are not scaled) and ridge.
+WEIGHT_SCALE = 5.0
+RIDGE = 1e-4
+
+# λ of Eq. 5, for all variants without a prior, and random starts of the
+# paper's way.
+PLAIN_LAMBDA = 1e-3
+PAPER_STARTS = 3
 
 
 @dataclasses.dataclass(frozen=True)
 class ToyDomain:
-    """A square, and the ELM that learns there.
+    """A square.
 
     Attributes:
         low, high: of both inputs.
-        weight_scale: of the ELM, whose inputs are not scaled here.
-        alpha: ridge of the ELM.
-        n_source: points that the ELM learns from.
-        n_target: points of the turned square: `n_labelled` with known values
-            and the others.
-        n_labelled: how many a transfer may use.
     """
 
     low: float
     high: float
-    weight_scale: float
-    alpha: float
-    n_source: int = 20
-    n_target: int = 105
-    n_labelled: int = 5
 
 
-DOMAINS = {
-    "unit": ToyDomain(0.0, 1.0, weight_scale=6.0, alpha=1e-4),
-    # The deviation of weights that are even between -2 and 2.
-    "wide": ToyDomain(
-        -1.3, 1.3, weight_scale=2.0 / math.sqrt(3.0), alpha=1e-6, n_source=25
-    ),
-}
+DOMAINS = {"unit": ToyDomain(0.0, 1.0), "wide": ToyDomain(-1.3, 1.3)}
 
 TRANSFERS = {
-    "paper_single_start": "Eq. 5, one start (paper)",
+    "paper": f"Eq. 5, best of {PAPER_STARTS} random starts (paper)",
+    "paper_single_start": "Eq. 5, one start: the identity",
     "several_starts": "Eq. 5, 32 starts",
     "averaged_starts": "Eq. 5, average over starts",
     "default": "default: prior, average",
-    "unlabelled": "default, 100 unlabelled inputs",
+    "unlabelled": "default, other 15 inputs too",
     "similarity": "h a similarity",
     "true_map": "h known (limit)",
 }
@@ -94,13 +94,13 @@ BASELINES = {
 }
 
 
-FUNCTION = "2 x1^3 + 4 x2 + 2 exp(x1 x2), half a turn (stand-in for Eq. 6)"
+FUNCTION = "(x1 + 1)^3 + 2 (x2 + 1)^3 / 10 (Eq. 6), half a turn"
 
 
 def toy_function(X: Array) -> Array:
-    """f(x) = 2 x₁³ + 4 x₂ + 2 exp(x₁ x₂): X (N, 2) to (N,)."""
+    """f(x) = (x₁ + 1)³ + 2 (x₂ + 1)³ / 10 (Eq. 6): X (N, 2) to (N,)."""
     a, b = np.asarray(X, dtype=float).T
-    return 2.0 * a**3 + 4.0 * b + 2.0 * np.exp(a * b)
+    return (a + 1.0) ** 3 + 2.0 * (b + 1.0) ** 3 / 10.0
 
 
 # Half a turn about the origin: the turned square and the map back.
@@ -113,10 +113,10 @@ class ToyProblem:
 
     Attributes:
         source: the fitted ELM.
-        X, y: (N, 2), (N,), what it has learned.
-        X_test, y_test: more of the same square.
-        Z: (M, 2), inputs of the square that the target points stand for.
-        X_target, y_target: (M, 2), (M,), those points, turned.
+        X, y: (14, 2), (14,), what it has learned.
+        X_test, y_test: (6, 2), (6,), the others of the same 20 points.
+        Z: (20, 2), inputs of the square that the target points stand for.
+        X_target, y_target: (20, 2), (20,), those points, turned.
     """
 
     source: Any
@@ -130,20 +130,21 @@ class ToyProblem:
 
 
 def make_problem(
-    domain: ToyDomain, seed: int, n_hidden: int = 50
+    domain: ToyDomain, seed: int, weight_scale: float = WEIGHT_SCALE
 ) -> ToyProblem:
     """Data and a trained ELM, all determined by the seed."""
     from drake_affetto.skill import ElmRegressor
 
     random = np.random.default_rng([seed, 0])
-    X, X_test, Z = (
+    points, Z = (
         random.uniform(domain.low, domain.high, (n, 2))
-        for n in (domain.n_source, 1000, domain.n_target)
+        for n in (N_SOURCE, N_TARGET)
     )
+    order = random.permutation(N_SOURCE)
+    X, X_test = points[order[:N_TRAIN]], points[order[N_TRAIN:]]
     source = ElmRegressor(
-        n_hidden,
-        domain.alpha,
-        weight_scale=domain.weight_scale,
+        alpha=RIDGE,
+        weight_scale=weight_scale,
         random_state=int(random.integers(2**31)),
     )
     source.fit(X, toy_function(X))
@@ -159,15 +160,60 @@ def make_problem(
     )
 
 
-def make_transfer(name: str, source: Any) -> Any:
-    """The transfer of that name, to be fitted."""
+def make_paper_transfer(
+    source: Any,
+    repeat: int,
+    n_starts: int = PAPER_STARTS,
+    alpha: float = PLAIN_LAMBDA,
+) -> Any:
+    """Eq. 5 by BFGS, the best of starts with H and c drawn from N(0, 1).
+
+    Args:
+        source: the fitted ELM.
+        repeat: seed of the starts.
+        n_starts: how many.
+        alpha: λ.
+    """
+    from drake_affetto.skill import Affine, TransferRegressor
+
+    class RandomStarts(Affine):
+        def starts(
+            self, target: Any, source: Any, n_starts: int, random: Any
+        ) -> list[tuple[str, Array]]:
+            size = self.count(target.mean.size, source.mean.size)
+            drawn = random.normal(size=(n_starts, size))
+            return [("random", parameters) for parameters in drawn]
+
+    return TransferRegressor(
+        source,
+        RandomStarts(),
+        alpha=alpha,
+        prior=None,
+        metric=None,
+        average=False,
+        solver="bfgs",
+        n_starts=n_starts,
+        random_state=repeat,
+    )
+
+
+def make_transfer(name: str, source: Any, repeat: int = 0) -> Any:
+    """The transfer of that name, to be fitted; `repeat` seeds random starts."""
     from drake_affetto.skill import TransferRegressor, make_scheme
 
+    if name == "paper":
+        return make_paper_transfer(source, repeat)
     if name == "paper_single_start":
-        return make_scheme("transfer", source)
+        scheme = make_scheme("transfer", source)
+        return scheme.set_params(alpha=PLAIN_LAMBDA)
+    plain: dict[str, Any] = {
+        "prior": None,
+        "metric": None,
+        "alpha": PLAIN_LAMBDA,
+    }
     options: dict[str, dict[str, Any]] = {
-        "several_starts": {"prior": None, "metric": None, "average": False},
-        "averaged_starts": {"prior": None, "metric": None},
+        "several_starts": {**plain, "average": False},
+        "averaged_starts": plain,
         "default": {},
         "unlabelled": {},
         "similarity": {"mapping": "similarity"},
@@ -175,12 +221,35 @@ def make_transfer(name: str, source: Any) -> Any:
     return TransferRegressor(source, **options[name])
 
 
-def subset(domain: ToyDomain, seed: int, repeat: int) -> NDArray[np.bool_]:
-    """(M,), which target points have known values in that repeat."""
+def subset(seed: int, repeat: int) -> NDArray[np.bool_]:
+    """(20,), which target points have known values in that repeat."""
     random = np.random.default_rng([seed, 1, repeat])
-    chosen = np.zeros(domain.n_target, dtype=bool)
-    chosen[random.permutation(domain.n_target)[: domain.n_labelled]] = True
+    chosen = np.zeros(N_TARGET, dtype=bool)
+    chosen[random.permutation(N_TARGET)[:N_LABELED]] = True
     return chosen
+
+
+def predict_target(
+    name: str, problem: ToyProblem, known: NDArray[np.bool_], repeat: int
+) -> Array:
+    """What a method says of all target points (20,) after those it knows."""
+    from drake_affetto.skill import make_scheme
+
+    if name == "true_map":
+        return problem.source.predict(problem.Z)
+    estimator = (
+        make_scheme(name, problem.source)
+        if name in BASELINES
+        else make_transfer(name, problem.source, repeat)
+    )
+    further = (problem.X_target[~known],) if name == "unlabelled" else ()
+    with warnings.catch_warnings():
+        # Five points do not determine six parameters: that is the experiment.
+        warnings.simplefilter("ignore", UserWarning)
+        estimator.fit(
+            problem.X_target[known], problem.y_target[known], *further
+        )
+    return estimator.predict(problem.X_target)
 
 
 def run_seed(spec: Spec) -> Result:
@@ -190,38 +259,18 @@ def run_seed(spec: Spec) -> Result:
         The figures of the source; and by method an array (repeats, 2) of the
         mean squared errors on the points it was given and on the others.
     """
-    from drake_affetto.skill import make_scheme
-
-    domain = ToyDomain(**spec["domain"])
     seed = spec["seed"]
-    problem = make_problem(domain, seed)
-    source = problem.source
+    problem = make_problem(ToyDomain(**spec["domain"]), seed)
     errors: dict[str, list[tuple[float, float]]] = {
         name: [] for name in (*TRANSFERS, *BASELINES)
     }
     for repeat in range(spec["repeats"]):
-        known = subset(domain, seed, repeat)
-        X, y = problem.X_target[known], problem.y_target[known]
+        known = subset(seed, repeat)
         for name, found in errors.items():
-            if name == "true_map":
-                predicted = source.predict(problem.Z)
-            else:
-                estimator = (
-                    make_scheme(name, source)
-                    if name in BASELINES
-                    else make_transfer(name, source)
-                )
-                further = (
-                    (problem.X_target[~known],) if name == "unlabelled" else ()
-                )
-                with warnings.catch_warnings():
-                    # Five points do not determine six parameters: that is
-                    # the experiment.
-                    warnings.simplefilter("ignore", UserWarning)
-                    estimator.fit(X, y, *further)
-                predicted = estimator.predict(problem.X_target)
+            predicted = predict_target(name, problem, known, repeat)
             squared = (predicted - problem.y_target) ** 2
             found.append((squared[known].mean(), squared[~known].mean()))
+    source = problem.source
     result = {
         "train_mse": _mse(source, problem.X, problem.y),
         "test_mse": _mse(source, problem.X_test, problem.y_test),

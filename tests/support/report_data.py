@@ -346,6 +346,7 @@ def toy(seed=0, seeds=6):
                 "per_seed": {"train_mse": [0.001] * seeds},
             },
             "transfer": {
+                "paper": row(0.3 * scale),
                 "paper_single_start": row(0.6 * scale),
                 "several_starts": row(0.18 * scale),
                 "default": row(0.07 * scale),
@@ -363,7 +364,7 @@ def toy(seed=0, seeds=6):
         **head("toy", seed),
         "seeds": seeds,
         "repeats": 100,
-        "function": "2 x1^3 + 4 x2 + 2 exp(x1 x2), half a turn",
+        "function": "(x1 + 1)^3 + 2 (x2 + 1)^3 / 10 (Eq. 6), half a turn",
         "paper": {
             "source": {
                 "train_mse": 0.0,

@@ -14,7 +14,7 @@ class SourceErrors:
 
     Attributes:
         train_mse: Mean squared error on the training points.
-        test_mse: Mean squared error on the test points.
+        test_mse: Mean squared error on the other points of the same draw.
         rotated_mse: Mean squared error on the rotated points.
     """
 

@@ -133,7 +133,7 @@ def toy_errors(
     return style.Chart(
         key,
         f"On the square {square}",
-        "Fig. 2. Errors on the 100 points whose values were not given, after "
+        "Fig. 2. Errors on the 15 points whose values were not given, after "
         "five that were; a pale dot is the mean of one seed, the bordered "
         "symbol the median over the seeds. Less is better; the axis is "
         "logarithmic.",

@@ -92,7 +92,7 @@ def _toy_rows(data: ReportData) -> list[list[str]]:
     rows = []
     for key, label in (
         ("train_mse", "toy: error where it was trained"),
-        ("test_mse", "toy: error beside that"),
+        ("test_mse", "toy: error on the other 6 points"),
         ("rotated_mse", "toy: error on the turned square"),
     ):
         value = getattr(toy.source, key)
@@ -104,6 +104,7 @@ def _toy_rows(data: ReportData) -> list[list[str]]:
             ]
         )
     named = {
+        "paper": "Eq. 5, random starts",
         "paper_single_start": "Eq. 5, one start",
         "default": "our default",
     }
