@@ -47,9 +47,10 @@ def test_the_package_itself_offers_station_and_scenario():
 
 
 def test_a_face_imports_nothing_heavy():
+    # That of the environments registers them with gymnasium, which does.
     code = (
         "import importlib, sys\n"
-        f"for room in {ROOMS!r}:\n"
+        f"for room in {sorted(set(ROOMS) - {'envs'})!r}:\n"
         "    importlib.import_module(f'drake_affetto.{room}')\n"
         "heavy = {'numpy', 'scipy', 'sklearn', 'pydrake', 'numba', 'cv2'}\n"
         "print(sorted(heavy & set(sys.modules)))\n"

@@ -31,6 +31,7 @@ COMMANDS = {
     "report": "the results of studies as one page",
     "identify": "fit the actuators to a robot's logs",
     "tune": "tune the controllers' gains on the whole robot",
+    "export": "trials of a study as a table, or one trial's signals",
     "status": "show how far a study is",
     "view": "show the robot in a browser, with sliders",
     "diagram": "draw a station's systems and their connections",

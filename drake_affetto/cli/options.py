@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 
 from drake_affetto.common.errors import InputError, require_range
 from drake_affetto.common.fields import option_name
+from drake_affetto.common.output import STORE
 
-STORE = "trials.sqlite"
 WORKERS = 2
 
 Plan = TypeVar("Plan")

@@ -16,6 +16,9 @@ from typing import Any
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.typed_json import to_plain
 
+# A study's finished trials, in its folder.
+STORE = "trials.sqlite"
+
 
 def prepare_output(path: str | Path) -> Path:
     """Makes the folder `path` with its parents, and sees that it takes files.

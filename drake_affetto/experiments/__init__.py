@@ -16,6 +16,12 @@ if TYPE_CHECKING:
         TeachPlan,
         ToyPlan,
     )
+    from drake_affetto.experiments.signals import (
+        Signals,
+        read_signals,
+        run_again,
+    )
+    from drake_affetto.experiments.tables import read_trials, write_trials
     from drake_affetto.experiments.teaching import teach
     from drake_affetto.experiments.toy import run_toy
 
@@ -25,13 +31,18 @@ __getattr__, __dir__, __all__ = attach(
         "DemoPlan": "plans",
         "DrumPlan": "plans",
         "MirrorPlan": "plans",
+        "Signals": "signals",
         "TeachPlan": "plans",
         "ToyPlan": "plans",
         "TrialRunner": "episode",
+        "read_signals": "signals",
+        "read_trials": "tables",
+        "run_again": "signals",
         "run_demo": "demo",
         "run_drum": "drumming",
         "run_mirror": "mirror",
         "run_toy": "toy",
         "teach": "teaching",
+        "write_trials": "tables",
     },
 )

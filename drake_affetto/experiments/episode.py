@@ -71,6 +71,7 @@ class Recording:
         joint_state: Angles and speeds (S, 2n), rad, rad/s.
         desired_state: Desired angles and speeds (S, 2n), rad, rad/s.
         chamber_pressure: Absolute pressures (S, 2n), Pa.
+        valve_opening: Commands to the valves (S, n), -1 to 1.
         sound: Sound pressure at the microphone (samples,), Pa.
         sound_rate: Sampling rate of the sound, 1/s.
     """
@@ -82,6 +83,7 @@ class Recording:
     joint_state: Array
     desired_state: Array
     chamber_pressure: Array
+    valve_opening: Array
     sound: Array
     sound_rate: float
 
@@ -143,6 +145,7 @@ class TrialRunner:
             "affetto.estimated_state": 1.0 / scenario.teaching.recording_rate,
             "affetto.desired_state": 1.0 / scenario.teaching.recording_rate,
             "affetto.chamber_pressure": 1.0 / scenario.teaching.recording_rate,
+            "affetto.valve_opening": 1.0 / scenario.teaching.recording_rate,
             "affetto.pid_output": scenario.control.period,
             "teacher.pulling_force": 1.0 / scenario.teaching.update_rate,
         }
@@ -206,7 +209,7 @@ class TrialRunner:
             linger: Time for which the simulation goes on after the end of the
                 search, s.
         """
-        begin = self._start(xy)
+        begin = self.settle(xy)
         # The gaze alone: no movement starts within any trial's time.
         self.station.policy.set_policy_parameters(
             self._sub(self.station.policy),
@@ -256,9 +259,9 @@ class TrialRunner:
     def _soften(self, xy: Array) -> float:
         """Makes the arm compliant (paper Eq. 8); returns the time, s."""
         teaching, station = self.scenario.teaching, self.station
-        begin = self._start(xy)
+        begin = self.settle(xy)
         # What holds the arm at rest will hold it while it is guided.
-        self._advance(begin + teaching.settling_time)
+        self.advance(begin + teaching.settling_time)
         u_eq = self._log("affetto.pid_output")[1].mean(axis=0)
         controller = self._sub(station.controller)
         gains = station.controller.get_gains(controller)
@@ -271,7 +274,7 @@ class TrialRunner:
     def _record_guidance(self, grasped: float) -> GuidedMovement:
         """Records the guided movement from the time `grasped` on, s."""
         self._clear_logs()
-        self._advance(grasped + self.scenario.teaching.duration)
+        self.advance(grasped + self.scenario.teaching.duration)
         t, state = self._log("affetto.estimated_state")
         _, pull = self._log("teacher.pulling_force")
         t = t - grasped
@@ -291,7 +294,7 @@ class TrialRunner:
             theta: Parameters θ of the movement (n·K,).
             seed: Seed of the microphone's noise.
         """
-        begin = self._start(xy)
+        begin = self.settle(xy)
         start = begin + self.scenario.policy.delay
         self.station.policy.set_policy_parameters(
             self._sub(self.station.policy), theta, start
@@ -312,7 +315,7 @@ class TrialRunner:
             The outcome of the gaze, and the recording (None if the drum was
             not found).
         """
-        begin = self._start(xy)
+        begin = self.settle(xy)
         policy = self._sub(self.station.policy)
         self.station.policy.set_regressor(policy, regressor)
         self._enable_gaze(seed)
@@ -323,7 +326,7 @@ class TrialRunner:
         while not self.station.policy.is_latched(policy):
             if self.context.get_time() > limit:
                 raise RuntimeError("the gaze has settled but is never ready")
-            self._advance(self.context.get_time() + 0.05)
+            self.advance(self.context.get_time() + 0.05)
         start = float(self.port("affetto.start_time")[0])
         return outcome, self._record(start, seed)
 
@@ -338,14 +341,14 @@ class TrialRunner:
     def _sub(self, system) -> Context:
         return system.GetMyMutableContextFromRoot(self.context)
 
-    def _start(self, xy: Array) -> float:
-        """Settles the robot, drum at xy; returns the time, s."""
+    def settle(self, xy: Array) -> float:
+        """Starts a trial: robot at rest, drum at xy, m; gives the time, s."""
         if self._settled is None:
             station = self.station
             station.reset(self._station_context)
             self.context.SetTime(self._start_time)
             self.simulator.Initialize()
-            self._advance(self._start_time + self.scenario.settling_duration)
+            self.advance(self._start_time + self.scenario.settling_duration)
             self._settled = self.context.Clone()
         self._restore(self._settled)
         self.station.set_drum_position(self._station_context, xy)
@@ -392,15 +395,27 @@ class TrialRunner:
     def _advance_frame(
         self, begin: float, on_frame: Callable[[float], None] | None
     ) -> None:
-        self._advance(self.context.get_time() + FRAME_PERIOD)
+        self.advance(self.context.get_time() + FRAME_PERIOD)
         if on_frame is not None:
             on_frame(self.context.get_time() - begin)
 
     def _record(self, start: float, seed: int) -> Recording:
         """Simulates the movement that starts at `start`, with its sound."""
-        self._advance(start)
+        self.advance(start)
         self._clear_logs()
-        self._advance(start + self.scenario.dmp.duration + _RINGING)
+        self.advance(start + self.scenario.dmp.duration)
+        return self.finish_recording(start, seed)
+
+    def finish_recording(self, start: float, seed: int) -> Recording:
+        """The recording of a movement that has just ended, with its sound.
+
+        The simulation goes on for a moment, in which the drum rings on.
+
+        Args:
+            start: Time of the movement's start, s.
+            seed: Seed of the microphone's noise.
+        """
+        self.advance(self.context.get_time() + _RINGING)
         t, contact = self._log("drum.contact_force")
         _, knock = self._log("drum.knock_force")
         _, flow = self._log("affetto.mass_flow")
@@ -424,11 +439,13 @@ class TrialRunner:
             joint_state=state,
             desired_state=self._log("affetto.desired_state")[1],
             chamber_pressure=self._log("affetto.chamber_pressure")[1],
+            valve_opening=self._log("affetto.valve_opening")[1],
             sound=sound,
             sound_rate=self.voice.rate,
         )
 
-    def _advance(self, time: float) -> None:
+    def advance(self, time: float) -> None:
+        """Simulates until `time`, s."""
         if time > self.context.get_time():
             self.simulator.AdvanceTo(time)
 

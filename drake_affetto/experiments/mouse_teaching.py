@@ -56,7 +56,7 @@ class MouseTeachingRunner(TrialRunner):
 
     def _wait(self, *, held: bool) -> None:
         while bool(np.any(self.port("teacher.pulling_force"))) != held:
-            self._advance(self.context.get_time() + _POLL)
+            self.advance(self.context.get_time() + _POLL)
             self._clear_logs()
 
     def _show_stroke(self) -> None:

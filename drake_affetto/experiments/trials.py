@@ -102,6 +102,21 @@ def _fingerprint(scenario: str) -> dict[str, str]:
     }
 
 
+def check_scenario(spec: Spec) -> None:
+    """Raises InputError if a stored spec's scenario is another one by now.
+
+    Its trial would give something else than it did.
+    """
+    then = spec["scenario"]
+    now = _fingerprint(then["name"])
+    changed = [name for name in now if then.get(name) != now[name]]
+    if changed:
+        raise InputError(
+            f"the scenario {then['name']!r} is not the one of the stored "
+            f"trial: other {', '.join(changed)}"
+        )
+
+
 def _spec(kind: str, scenario: str, **rest: Any) -> Spec:
     return {"kind": kind, "scenario": _fingerprint(scenario), **rest}
 
@@ -245,6 +260,11 @@ def run_trials(
     return {key: typed(key, result) for key, result in found.items()}
 
 
+def replay_seed(seed: int, attempt: int) -> int:
+    """Seed of the noise of a demonstration's replay number 0, 1, ..."""
+    return seed + _REPLAY_SEED_STEP * (attempt + 1)
+
+
 def demonstrate(
     trials: TrialRunner,
     xy: np.ndarray,
@@ -284,7 +304,7 @@ def demonstrate(
         movement = guide(attempt)
         # The robot's own replay decides.
         recording = trials.strike(
-            xy, movement.theta, seed + _REPLAY_SEED_STEP * (attempt + 1)
+            xy, movement.theta, replay_seed(seed, attempt)
         )
         value = trials.reward(recording, prototypes)
         result = dataclasses.replace(

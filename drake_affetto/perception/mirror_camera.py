@@ -16,6 +16,7 @@ from pydrake.geometry import (
     MakeRenderEngineVtk,
     QueryObject,
     RenderCameraCore,
+    RenderEngine,
     RenderEngineVtkParams,
     Rgba,
     Role,
@@ -62,11 +63,20 @@ MIRROR = "mirror"
 def add_renderers(scene_graph: SceneGraph, config: RenderConfig) -> None:
     """Adds the renderers `direct` and `mirror` to a SceneGraph.
 
-    Both have the same lights, which stand still in the world: a lamp on the
-    camera would light the direct and the mirrored view differently. What
-    must not be seen in the mirror pass (the panels, and things behind them)
-    carries `<drake:accepting_renderer>direct</drake:accepting_renderer>` in
-    its SDF.
+    What must not be seen in the mirror pass (the panels, and things behind
+    them) carries `<drake:accepting_renderer>direct
+    </drake:accepting_renderer>` in its SDF.
+    """
+    for name in (DIRECT, MIRROR):
+        if not scene_graph.HasRenderer(name):
+            scene_graph.AddRenderer(name, make_renderer(config))
+
+
+def make_renderer(config: RenderConfig) -> RenderEngine:
+    """A renderer whose lights stand still in the world.
+
+    A lamp on the camera would light the direct and the mirrored view
+    differently.
     """
     params = RenderEngineVtkParams()
     params.default_clear_color = np.asarray(config.background, dtype=float)
@@ -83,9 +93,7 @@ def add_renderers(scene_graph: SceneGraph, config: RenderConfig) -> None:
         )
         for light in config.lights
     ]
-    for name in (DIRECT, MIRROR):
-        if not scene_graph.HasRenderer(name):
-            scene_graph.AddRenderer(name, MakeRenderEngineVtk(params))
+    return MakeRenderEngineVtk(params)
 
 
 def find_frame(plant: MultibodyPlant, name: str) -> Frame:

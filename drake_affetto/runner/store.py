@@ -2,22 +2,25 @@
 
 A trial is keyed by everything that determines its result. A study that was
 killed starts again and finds what it had; two half-finished studies of the
-same trials join to a whole by copying rows.
+same trials join to a whole by copying rows. The arrays of a spec are kept too,
+each once, so that a trial can be run again from its row.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 import dataclasses
 import io
 import json
 from pathlib import Path
+import re
 import sqlite3
 from typing import Any
+import zipfile
 
 import numpy as np
 
-from drake_affetto.common.errors import InputError
+from drake_affetto.common.errors import InputError, require
 from drake_affetto.common.fingerprint import text_digest
-from drake_affetto.common.nested import map_leaves
+from drake_affetto.common.nested import leaves, map_leaves
 
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS trials (
@@ -34,8 +37,19 @@ CREATE TABLE IF NOT EXISTS plans (
     position INTEGER NOT NULL,
     key TEXT NOT NULL,
     PRIMARY KEY (label, position)
+);
+CREATE TABLE IF NOT EXISTS inputs (
+    name TEXT PRIMARY KEY,
+    arrays BLOB NOT NULL
 )
 """
+
+
+def _content_name(value: Any) -> str:
+    """An array's or estimator's type and the digest of its content."""
+    import joblib
+
+    return f"{type(value).__name__}:{joblib.hash(value)}"
 
 
 def _key_values(value: Any) -> Any:
@@ -46,12 +60,23 @@ def _key_values(value: Any) -> Any:
             return value.item()
         if value is None or isinstance(value, (str, int, float, bool)):
             return value
-        # Arrays, estimators: the digest of their content.
-        import joblib
-
-        return f"{type(value).__name__}:{joblib.hash(value)}"
+        return _content_name(value)
 
     return map_leaves(value, leaf)
+
+
+# What joblib's hash looks like.
+_DIGEST = re.compile("[0-9a-f]{32}")
+
+
+def _object(text: str, where: str) -> dict[str, Any]:
+    """The JSON object in `text`; raises InputError naming `where`."""
+    try:
+        plain = json.loads(text)
+    except (ValueError, TypeError) as error:
+        raise InputError(f"{where} is damaged: {error}") from error
+    require(isinstance(plain, dict), where, plain, "an object")
+    return plain
 
 
 def trial_key(spec: Mapping[str, Any]) -> str:
@@ -86,6 +111,27 @@ class Phase:
     label: str
     total: int
     done: int
+
+
+@dataclasses.dataclass(frozen=True)
+class TrialRow:
+    """One finished trial as it is stored.
+
+    Attributes:
+        key: Its key, see `trial_key`.
+        kind: Kind of trial.
+        spec: What determined it; names stand for arrays and estimators.
+        result: Its result, without arrays.
+        finished_at: When it was finished, UTC in ISO 8601.
+        phase: Name of the first phase that planned it; None if none did.
+    """
+
+    key: str
+    kind: str
+    spec: dict[str, Any]
+    result: dict[str, Any]
+    finished_at: str
+    phase: str | None
 
 
 def remove_store(path: Path) -> None:
@@ -163,6 +209,14 @@ class TrialStore:
                         pack_arrays(arrays),
                     ),
                 )
+                self._db.executemany(
+                    "INSERT OR IGNORE INTO inputs VALUES (?, ?)",
+                    (
+                        (_content_name(leaf), pack_arrays({"value": leaf}))
+                        for leaf in leaves(spec)
+                        if isinstance(leaf, np.ndarray)
+                    ),
+                )
         except sqlite3.Error as error:
             raise InputError(
                 f"cannot write to {self.path}: {error}; "
@@ -218,6 +272,11 @@ class TrialStore:
                         f"INSERT OR IGNORE INTO trials ({columns}) "
                         f"SELECT {columns} FROM other.trials"
                     )
+                    if self._has_inputs("other"):
+                        self._db.execute(
+                            "INSERT OR IGNORE INTO inputs "
+                            "SELECT name, arrays FROM other.inputs"
+                        )
             finally:
                 self._db.execute("DETACH DATABASE other")
         except sqlite3.Error as error:
@@ -225,6 +284,91 @@ class TrialStore:
                 f"cannot take trials over from {other}: {error}"
             ) from error
         return len(self) - before
+
+    def rows(self) -> Iterator[TrialRow]:
+        """All finished trials, in the order in which they were finished.
+
+        Raises:
+            InputError: If a row is damaged.
+        """
+        try:
+            for key, kind, spec, result, at, phase in self._db.execute(
+                "SELECT key, kind, spec, result, finished_at, (SELECT label "
+                "FROM plans WHERE plans.key = trials.key ORDER BY rowid "
+                "LIMIT 1) FROM trials ORDER BY finished_at, rowid"
+            ):
+                where = f"{self.path}: trial {key}"
+                yield TrialRow(
+                    key,
+                    kind,
+                    _object(spec, f"{where}: spec"),
+                    _object(result, f"{where}: result"),
+                    at,
+                    phase,
+                )
+        except sqlite3.Error as error:
+            raise InputError(
+                f"cannot read trials in {self.path}: {error}"
+            ) from error
+
+    def spec(self, key: str) -> tuple[str, dict[str, Any]]:
+        """The whole key and the spec of a finished trial, with its arrays.
+
+        Args:
+            key: The trial's key, or as much of it as no other trial's has.
+
+        Raises:
+            InputError: If no trial, or several, have such a key, or an input
+                is not kept: only arrays are, and only since they are.
+        """
+        try:
+            found = self._db.execute(
+                "SELECT key, spec FROM trials WHERE substr(key, 1, ?) = ?",
+                (len(key), key),
+            ).fetchall()
+            if len(found) != 1 or not key:
+                raise InputError(
+                    f"key is {key!r}, expected that of one trial in "
+                    f"{self.path}; {len(found)} fit"
+                )
+            whole, text = found[0]
+            where = f"{self.path}: trial {whole}"
+            if text_digest(text, length=None) != whole:
+                raise InputError(f"{where}: its spec is damaged")
+            spec = map_leaves(
+                _object(text, f"{where}: spec"),
+                lambda leaf: self._input(leaf, where),
+            )
+        except sqlite3.Error as error:
+            raise InputError(
+                f"cannot read trials in {self.path}: {error}"
+            ) from error
+        return whole, spec
+
+    def _input(self, leaf: Any, where: str) -> Any:
+        """The array that a text in a stored spec stands for; others stay."""
+        name, _, digest = str(leaf).partition(":")
+        if not (isinstance(leaf, str) and _DIGEST.fullmatch(digest)):
+            return leaf
+        row = None
+        if self._has_inputs():
+            row = self._db.execute(
+                "SELECT arrays FROM inputs WHERE name = ?", (leaf,)
+            ).fetchone()
+        if row is None:
+            raise InputError(f"{where} was run with a {name} that is not kept")
+        try:
+            return unpack_arrays(row[0])["value"]
+        except (ValueError, KeyError, OSError, zipfile.BadZipFile) as error:
+            raise InputError(f"{where}: its {name} is damaged") from error
+
+    def _has_inputs(self, schema: str = "main") -> bool:
+        """Whether a file keeps inputs; those of version 0.1.0 do not."""
+        return bool(
+            self._db.execute(
+                f"SELECT 1 FROM {schema}.sqlite_master WHERE name = 'inputs'"
+            ).fetchone()
+        )
 
     def finished_at(self) -> list[str]:
         """When each trial was finished, UTC in ISO 8601, earliest first."""

@@ -17,6 +17,10 @@ from pydrake.visualization import AddFrameTriadIllustration
 from drake_affetto.common.errors import require_range
 from drake_affetto.scene import world
 
+# Where robot, drum and mirror are in view, and what is in the middle, m.
+CAMERA_POSITION = (0.95, -0.75, 0.50)
+CAMERA_TARGET = (0.16, 0.02, 0.10)
+
 _STOP = "Stop"
 _DRUM = ("drum x [m]", "drum y [m]")
 _FRAMES = ("eye_camera", "right_palm", "mirror", "head_center")
@@ -24,7 +28,7 @@ _FRAMES = ("eye_camera", "right_palm", "mirror", "head_center")
 
 def set_default_camera_pose(meshcat: Meshcat) -> None:
     """Puts the browser's camera where robot, drum and mirror are in view."""
-    meshcat.SetCameraPose([0.95, -0.75, 0.50], [0.16, 0.02, 0.10])
+    meshcat.SetCameraPose(CAMERA_POSITION, CAMERA_TARGET)
 
 
 def view_model(

@@ -48,3 +48,13 @@ def test_tutorial_runs_and_says_what_it_promises(tmp_path):
     # With three demonstrations.
     assert rows["transfer_default"][0] < 0.5 * rows["relearn"][0]
     assert rows["transfer_default"][0] < rows["transfer"][0]
+
+
+@pytest.mark.slow
+def test_a_learner_runs_and_draws_its_curve(tmp_path, monkeypatch):
+    monkeypatch.setenv("AFFETTO_CACHE", str(tmp_path / "cache"))
+    words = ("--episodes", "12", "--tests", "3", "--out", str(tmp_path))
+    done = run("tutorials/learn_by_reward.py", *words)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert re.search(r"the lessons' mean +\d+% +[\d.]+", done.stdout)
+    assert (tmp_path / "learning_curve.png").stat().st_size > 5000

@@ -116,3 +116,40 @@ def test_the_key_of_a_stored_trial_stays():
     assert trial_key(spec) == (
         "f700a687dc0e16f86d4a174c26a69ac54d701540ede2fc8d6672322fa4c69835"
     )
+
+
+def test_a_spec_comes_back_with_its_arrays(tmp_path):
+    array = np.linspace(0.0, 1.0, 5)
+    many = [spec(theta=array), spec(1, theta=array, more=[np.ones((2, 3))])]
+    with TrialStore(tmp_path / "a.sqlite") as store:
+        for each in many:
+            store.put(each, {"reward": 1.0}, {})
+        keys = [row.key for row in store.rows()]
+        assert keys == [trial_key(each) for each in many]
+        np.testing.assert_array_equal(
+            store.spec(keys[1][:9])[1]["more"][0], np.ones((2, 3))
+        )
+    with TrialStore(tmp_path / "b.sqlite") as other:
+        # Another study that takes trials over can run them again, too.
+        assert other.merge(tmp_path / "a.sqlite") == 2
+        np.testing.assert_array_equal(other.spec(keys[0])[1]["theta"], array)
+        with pytest.raises(InputError, match="key is ''"):
+            other.spec("")
+
+
+def test_a_spec_that_was_changed_is_refused(tmp_path):
+    with TrialStore(tmp_path / "a.sqlite") as store:
+        store.put(spec(theta=np.ones(2)), {}, {})
+        key = trial_key(spec(theta=np.ones(2)))
+        store._db.execute(
+            "UPDATE trials SET spec = replace(spec, ?, ?)",
+            ('"seed": 3', '"seed": 4'),
+        )
+        with pytest.raises(InputError, match="its spec is damaged"):
+            store.spec(key)
+        store._db.execute("UPDATE trials SET spec = '{'")
+        with pytest.raises(InputError, match="is damaged"):
+            store.spec(key)
+        store._db.execute("UPDATE trials SET spec = '[]'")
+        with pytest.raises(InputError, match="an object"):
+            list(store.rows())
