@@ -120,7 +120,7 @@ def _simulator(names, make):
     builder = DiagramBuilder()
     plant = add_reference_plant(builder, WorldConfig())
     robot = plant.GetModelInstanceByName("affetto")
-    selection = select_joints(plant, names)
+    selection = select_joints(plant, names, robot)
     n = len(names)
     to_plant = builder.AddSystem(MatrixGain(0.0 * selection.actuation_matrix))
     builder.Connect(
