@@ -15,7 +15,8 @@ def select(
 ) -> Any:
     """`yes()` where `condition` holds, else `no()`."""
     if isinstance(condition, Formula):
-        return if_then_else(condition, Expression(yes()), Expression(no()))
+        zero = Expression(0.0)  # makes floats expressions
+        return if_then_else(condition, zero + yes(), zero + no())
     return yes() if condition else no()
 
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         JointActuator,
         PneumaticParameters,
         load_parameters,
+        resting_pressure,
     )
 
 __getattr__, __dir__, __all__ = attach(
@@ -46,6 +47,7 @@ __getattr__, __dir__, __all__ = attach(
         "PneumaticParameters": "parameters",
         "PneumaticSystems": "driver",
         "load_parameters": "parameters",
+        "resting_pressure": "parameters",
         "mass_flow_rate": "flow",
         "opening_for_torque": "equilibrium",
         "pressures_for_torque": "equilibrium",

@@ -164,6 +164,12 @@ def ContinuousPneumaticActuation_(T):
                 q = self._state_port.Eval(context)[: self._n]
             context.SetContinuousState(self._rest(p_a, p_b, q))
 
+        def set_strokes(self, context: Context_[T], opening) -> None:
+            """Puts the spools where openings v⁺ (n) hold them, v⁻ = -v⁺."""
+            state = context.get_continuous_state_vector().CopyToVector()
+            state[4 * self._n :] = np.concatenate([opening, -opening])
+            context.SetContinuousState(state)
+
         def get_parameters(self, context: Context_[T]) -> NDArray[np.float64]:
             """A copy of the (ROWS, n) parameter array."""
             return self._array.copy()

@@ -31,6 +31,7 @@ from pydrake.systems.framework import (
 )
 
 from drake_affetto.common.errors import InputError, require
+from drake_affetto.common.typing import Array
 from drake_affetto.control.continuous_pidf import ContinuousPidfController
 from drake_affetto.control.pidf import load_control
 from drake_affetto.control.pidf_controller import (
@@ -44,11 +45,15 @@ from drake_affetto.pneumatics.actuation import (
     add_actuation,
 )
 from drake_affetto.pneumatics.continuous import ContinuousPneumaticActuation
-from drake_affetto.pneumatics.equilibrium import pressures_for_torque
+from drake_affetto.pneumatics.equilibrium import (
+    opening_for_torque,
+    pressures_for_torque,
+)
 from drake_affetto.pneumatics.parameters import (
     JointActuator,
     PneumaticParameters,
     load_parameters,
+    resting_pressure,
 )
 from drake_affetto.scene.joint_state import make_joint_state
 from drake_affetto.scene.joints import (
@@ -124,24 +129,57 @@ class PneumaticSystems:
             context: Its context.
         """
 
-        def own(system: Any) -> Context:
-            return diagram.GetMutableSubsystemContext(system, context)
-
-        gravity = self.plant.GetVelocitiesFromArray(
-            self.joints.model_instance,
-            self.plant.CalcGravityGeneralizedForces(own(self.plant)),
-        )
-        actuation = own(self.actuation)
+        actuation = diagram.GetMutableSubsystemContext(self.actuation, context)
         p_a, p_b = pressures_for_torque(
             self.actuation.get_parameters(actuation),
-            -gravity[self.joints.velocities],
+            self._holding_torque(diagram, context),
         )
         self.actuation.set_pressures(actuation, p_a, p_b)
         if self.controller is not None:
-            controller = own(self.controller)
+            controller = diagram.GetMutableSubsystemContext(
+                self.controller, context
+            )
             if isinstance(self.controller, PidfController):
                 self.controller.reset(controller, p_a - p_b)
             self.controller.set_integral(controller, p_a - p_b)
+
+    def find_equilibrium(self, diagram: Diagram, context: Context) -> Array:
+        """Puts the valves and chambers at rest where the joints are.
+
+        Unlike `hold_posture` this is an operating point of the open loop, in
+        flow mode: under the constant openings that are returned the chambers
+        keep their pressures, which carry gravity.
+
+        Args:
+            diagram: The diagram that was built with the systems.
+            context: Its context.
+
+        Returns:
+            Valve openings v⁺ (n).
+        """
+        actuation = diagram.GetMutableSubsystemContext(self.actuation, context)
+        parameters = self.actuation.get_parameters(actuation)
+        opening = opening_for_torque(
+            parameters, self._holding_torque(diagram, context)
+        )
+        self.actuation.set_pressures(
+            actuation,
+            resting_pressure(parameters, opening),
+            resting_pressure(parameters, -opening),
+        )
+        if isinstance(self.actuation, ContinuousPneumaticActuation):
+            self.actuation.set_strokes(actuation, opening)
+        return opening
+
+    def _holding_torque(self, diagram: Diagram, context: Context) -> Array:
+        """Torques (n) [N m] that hold the joints against gravity."""
+        gravity = self.plant.CalcGravityGeneralizedForces(
+            diagram.GetSubsystemContext(self.plant, context)
+        )
+        model = self.plant.GetVelocitiesFromArray(
+            self.joints.model_instance, gravity
+        )
+        return -model[self.joints.velocities]
 
 
 def AddPneumaticDriver(
