@@ -20,12 +20,12 @@ from drake_affetto.pneumatics.parameters import (
     load_parameters,
     resting_pressure,
 )
+from drake_affetto.scene.joints import select_joints
 from drake_affetto.scene.world import (
     ACTIVE_JOINTS,
     WorldConfig,
     joint_limits,
     joint_names,
-    select_joints,
 )
 
 _SLICE = 0.05

@@ -205,10 +205,9 @@ def ContinuousPidfController_(T):
                 lambda: integral * excess,
                 lambda: zero,
             )
-            rate = excess
-            for condition in (driving > 0.0, full > 0.0, k_i <= 0.0):
-                rate = select(condition, lambda: zero, lambda kept=rate: kept)
-            return rate
+            rate = select(driving > 0.0, lambda: zero, lambda: excess)
+            rate = select(full > 0.0, lambda: zero, lambda: rate)
+            return select(k_i > 0.0, lambda: rate, lambda: zero)
 
     return Impl
 
