@@ -15,6 +15,10 @@ from drake_affetto.common.scalars import clip, select
 from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.control.pidf import PidfGains
 
+# Arithmetic of Expressions, which Drake tries as it looks for algebraic loops,
+# sets a flag of the processor that numpy would take for one of its own.
+_QUIET = np.errstate(invalid="ignore")
+
 
 @TemplateSystem.define(
     "ContinuousPidfController_", T_list=[float, AutoDiffXd, Expression]
@@ -142,6 +146,7 @@ def ContinuousPidfController_(T):
             parameter = context.get_numeric_parameter(self._gains_index)
             return parameter.CopyToVector().reshape(4, self._n)
 
+        @_QUIET
         def _demand(self, context):
             """Error, demand before its limit, and integral (n each)."""
             n = self._n
@@ -154,6 +159,7 @@ def ContinuousPidfController_(T):
                 u = u + offset.Eval(context)
             return error[:n], u, integral
 
+        @_QUIET
         def _opening(self, context, u):
             """Opening before its limit, and p_a - p_b (n each)."""
             n = self._n

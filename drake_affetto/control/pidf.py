@@ -153,10 +153,13 @@ class ControlParameters:
         for name in names:
             gains = self.gains.get(name)
             if gains is None and classes is not None:
-                gains = self.gains.get(classes.get(name, ""))
+                gains = self.gains.get(classes[name])
             if gains is None:
                 known = ", ".join(self.gains) or "none"
-                raise InputError(f"no gains for joint {name!r}; known: {known}")
+                either = f" or its class {classes[name]!r}" if classes else ""
+                raise InputError(
+                    f"no gains for joint {name!r}{either}; known: {known}"
+                )
             rows.append(gains)
         return PidfGains(
             kP=np.array([g.kP for g in rows]),
