@@ -83,7 +83,7 @@ def ContinuousPidfController_(T):
                     ("equilibrium_offset", n),
                 )
             ]
-            self._state_index = self.DeclareContinuousState(n)
+            self.DeclareContinuousState(n)
             self.DeclareVectorOutputPort("valve_opening", n, self._calc_opening)
             self.DeclareVectorOutputPort(
                 "pid_output",

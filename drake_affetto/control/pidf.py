@@ -151,16 +151,15 @@ class ControlParameters:
         """
         rows = []
         for name in names:
-            gains = self.gains.get(name)
-            if gains is None and classes is not None:
-                gains = self.gains.get(classes[name])
-            if gains is None:
+            actuator = (classes or {}).get(name)
+            found = [k for k in (name, actuator) if k in self.gains]
+            if not found:
                 known = ", ".join(self.gains) or "none"
-                either = f" or its class {classes[name]!r}" if classes else ""
+                either = f" or its class {actuator!r}" if actuator else ""
                 raise InputError(
                     f"no gains for joint {name!r}{either}; known: {known}"
                 )
-            rows.append(gains)
+            rows.append(self.gains[found[0]])
         return PidfGains(
             kP=np.array([g.kP for g in rows]),
             kI=np.array([g.kI for g in rows]),

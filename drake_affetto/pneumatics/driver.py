@@ -188,14 +188,10 @@ def AddPneumaticDriver(
     model_instance: ModelInstanceIndex,
     builder: DiagramBuilder,
 ) -> PneumaticSystems:
-    """Adds a model's pneumatics, its inputs left to be connected.
+    """Adds a model's pneumatics, for a diagram that has the command itself.
 
-    With a continuous plant (time step 0) the continuous versions are taken:
-    without dry friction, dead time and sampling, but for all of Drake's scalar
-    types. `ApplyPneumaticDriver` names the outputs, which are exported here.
-
-    Raises:
-        InputError: As `ApplyPneumaticDriver` does.
+    It is `ApplyPneumaticDriver`, which names arguments, outputs and errors, but
+    for the inputs: they are left to be connected.
     """
     model = plant.GetModelInstanceName(model_instance)
     config.check(model)
@@ -254,6 +250,10 @@ def ApplyPneumaticDriver(
       `chamber_pressure` (2n), Pa absolute, `mass_flow` (2n), kg/s (not of the
       continuous version), and of a controller `valve_opening` (n) and
       `pid_output` (n), Pa.
+
+    With a continuous plant (time step 0) the continuous versions are taken:
+    without dry friction, dead time and sampling, but for all of Drake's scalar
+    types.
 
     For a prismatic joint read m for rad and N for N m; its torque constant is
     the piston's area.

@@ -13,6 +13,7 @@ from drake_affetto.pneumatics.parameters import (
     PneumaticParameters,
     chamber_volumes,
     load_parameters,
+    parameter_array,
     resting_pressure,
 )
 
@@ -105,6 +106,11 @@ def test_unknown_joints_and_limits_are_named():
             InputError, match=r"range of joint one is .*, expected a finite"
         ):
             simple().for_joints(["one"], *np.transpose([limits]))
+
+
+def test_parameters_need_joints_to_be_an_array():
+    with pytest.raises(InputError, match="joints is None"):
+        parameter_array(simple())
 
 
 def test_resting_pressure_of_tight_valves_is_in_the_middle():
