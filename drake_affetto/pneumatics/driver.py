@@ -128,7 +128,6 @@ class PneumaticSystems:
             diagram: The diagram that was built with the systems.
             context: Its context.
         """
-
         actuation = diagram.GetMutableSubsystemContext(self.actuation, context)
         p_a, p_b = pressures_for_torque(
             self.actuation.get_parameters(actuation),
@@ -156,7 +155,12 @@ class PneumaticSystems:
 
         Returns:
             Valve openings v⁺ (n).
+
+        Raises:
+            InputError: In regulator mode.
         """
+        command = self.actuation.get_command_input_port().get_name()
+        require(command == "valve_opening", "command", command, "valve_opening")
         actuation = diagram.GetMutableSubsystemContext(self.actuation, context)
         parameters = self.actuation.get_parameters(actuation)
         opening = opening_for_torque(

@@ -370,6 +370,28 @@ def test_an_equilibrium_is_one_of_the_open_loop():
     np.testing.assert_allclose(p_dot, 0.0, atol=1e-2)
 
 
+def test_pressure_regulators_have_no_openings_to_be_held():
+    regulator = PneumaticActuationConfig(mode="regulator")
+    diagram, systems = build(driver(control=False, pneumatics=regulator))
+    with pytest.raises(InputError, match="pressure_command"):
+        systems.find_equilibrium(diagram, diagram.CreateDefaultContext())
+
+
+def test_joints_without_a_driver_get_no_torque():
+    config = PneumaticDriver({"elbow": JointActuator("elbow")})
+    diagram, systems = build(config)
+    context = diagram.CreateDefaultContext()
+    systems.actuation.set_pressures(
+        systems.actuation.GetMyMutableContextFromRoot(context), 6e5, 2e5
+    )
+    torque = diagram.GetOutputPort("two_link_arm.actuation").Eval(context)
+    applied = systems.plant.get_actuation_input_port(
+        systems.joints.model_instance
+    ).Eval(systems.plant.GetMyContextFromRoot(context))
+    assert applied.tolist() == [0.0, torque[0]]
+    assert torque[0] > 1.0
+
+
 def test_the_discrete_arm_stays_at_the_equilibrium():
     diagram, systems = build(driver(control=False))
     plant = systems.plant
