@@ -1,6 +1,6 @@
 """What systems of this package have in common: ports and their connections.
 
-The one module of this room that needs Drake to be imported.
+Importing it imports Drake, as `scalars` does and no other module of this room.
 """
 
 from collections.abc import Callable

@@ -29,7 +29,6 @@ from pydrake.systems.sensors import CameraInfo
 
 from drake_affetto.common.errors import require
 from drake_affetto.common.systems import connect
-from drake_affetto.control.pidf_controller import PidfController
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.motion.dmp_source import DmpSource
 from drake_affetto.perception.analytic_blob_sensor import AnalyticBlobSensor
@@ -37,11 +36,15 @@ from drake_affetto.perception.blob_sensor import BlobSensor
 from drake_affetto.perception.gaze import GazeMode, GazeTask
 from drake_affetto.perception.gaze_servo import GazeServo, gaze_view
 from drake_affetto.perception.mirror_camera import MirrorCamera
-from drake_affetto.pneumatics.actuation import PneumaticActuation
+from drake_affetto.pneumatics.driver import (
+    AddPneumaticDriver,
+    PneumaticDriver,
+    PneumaticSystems,
+)
+from drake_affetto.pneumatics.parameters import JointActuator
 from drake_affetto.scene import world
 from drake_affetto.skill.policy import SkillPolicy
 from drake_affetto.sound.microphone import DrumMicrophone
-from drake_affetto.station.joint_state import make_joint_state
 from drake_affetto.station.scenario import Scenario
 from drake_affetto.teaching.kinesthetic_teacher import KinestheticTeacher
 from drake_affetto.teaching.mouse_teacher import MouseTeacher
@@ -150,18 +153,21 @@ class AffettoStation(Diagram):
         world.add_world(self.plant, scenario.world)
         world.weld_inactive(self.plant, scenario.active_joints)
         self.plant.Finalize()
-        self.joints = world.select_joints(self.plant, scenario.active_joints)
         self._yaw = scenario.active_joints.index(scenario.yaw_joint)
-        self._robot = self.plant.GetModelInstanceByName("affetto")
+        self._robot = world.robot_instance(self.plant)
+        self.pneumatics = self._add_pneumatics(builder)
+        self.joints = self.pneumatics.joints
+        self.actuation = self.pneumatics.actuation
+        self.controller = self.pneumatics.controller
+        self._joint_state = self.pneumatics.joint_state
+        self._estimated_state = self._joint_state.get_output_port()
         self.start_posture = np.array(
             [
                 world.get_joint(self.plant, name).get_default_angle()
                 for name in self.joints.names
             ]
         )
-        self._estimated_state = self._add_estimation(builder)
         self._add_teacher(builder, meshcat if by_mouse else None)
-        self._add_actuation(builder)
         self._add_sight(builder)
         self._add_hearing(builder)
         desired = self._add_motion(builder)
@@ -211,7 +217,7 @@ class AffettoStation(Diagram):
         """
         mine = self._mine(context)
         self.SetDefaultContext(mine)
-        self._balance_gravity(context)
+        self.pneumatics.hold_posture(self, mine)
         if self.scenario.motion_source == "skill":
             look = self.scenario.look
             self.gaze.set_task(
@@ -226,22 +232,6 @@ class AffettoStation(Diagram):
             self.dmp_source.set_start_posture(
                 self._sub(self.dmp_source, context), self.start_posture
             )
-
-    def _balance_gravity(self, context: Context) -> None:
-        """Pressures about their resting value that hold the posture."""
-        plant_context = self._sub(self.plant, context)
-        gravity = self.plant.GetVelocitiesFromArray(
-            self._robot,
-            self.plant.CalcGravityGeneralizedForces(plant_context),
-        )
-        torque = -gravity[self.joints.velocities]
-        actuation = self._sub(self.actuation, context)
-        p_a, p_b = self.actuation.pressures_for_torque(actuation, torque)
-        self.actuation.set_pressures(actuation, p_a, p_b)
-        if self.scenario.valve_source == "pidf":
-            controller = self._sub(self.controller, context)
-            self.controller.reset(controller, p_a - p_b)
-            self.controller.set_integral(controller, p_a - p_b)
 
     def set_drum_position(self, context: Context, xy: ArrayLike) -> None:
         """Puts the drum at xy (2,), m, on the table in the world frame.
@@ -303,18 +293,21 @@ class AffettoStation(Diagram):
         """The system's context, from the station's or from the root's."""
         return self.GetMutableSubsystemContext(system, self._mine(context))
 
-    def _add_estimation(self, builder: DiagramBuilder) -> OutputPort:
-        self._joint_state = builder.AddNamedSystem(
-            "joint_state",
-            make_joint_state(self.joints, self.scenario.plant_config.time_step),
+    def _add_pneumatics(self, builder: DiagramBuilder) -> PneumaticSystems:
+        scenario = self.scenario
+        controlled = scenario.valve_source == "pidf"
+        return AddPneumaticDriver(
+            PneumaticDriver(
+                joints={
+                    name: JointActuator() for name in scenario.active_joints
+                },
+                pneumatics=scenario.pneumatics,
+                control=scenario.control if controlled else None,
+            ),
+            self.plant,
+            self._robot,
+            builder,
         )
-        builder.Connect(
-            self.plant.get_state_output_port(self._robot),
-            self._joint_state.get_input_port(),
-        )
-        estimated = self._joint_state.get_output_port()
-        builder.ExportOutput(estimated, "affetto.estimated_state")
-        return estimated
 
     def _add_teacher(
         self, builder: DiagramBuilder, mouse: Meshcat | None
@@ -342,40 +335,6 @@ class AffettoStation(Diagram):
             )
             pull = self.teacher.get_pulling_force_output_port()
         builder.ExportOutput(pull, "teacher.pulling_force")
-
-    def _add_actuation(self, builder: DiagramBuilder) -> None:
-        lower, upper = world.joint_limits(self.plant, self.joints.names)
-        config = self.scenario.pneumatics
-        config.time_step = self.scenario.plant_config.time_step
-        self.actuation = PneumaticActuation.AddToBuilder(
-            builder=builder,
-            config=config,
-            joint_names=self.joints.names,
-            q_lower=lower,
-            q_upper=upper,
-        )
-        builder.Connect(
-            self._estimated_state,
-            self.actuation.get_estimated_state_input_port(),
-        )
-        spread = builder.AddNamedSystem(
-            "joint_actuation", MatrixGain(D=self.joints.actuation_matrix)
-        )
-        builder.Connect(
-            self.actuation.get_actuation_output_port(),
-            spread.get_input_port(),
-        )
-        builder.Connect(
-            spread.get_output_port(),
-            self.plant.get_actuation_input_port(self._robot),
-        )
-        _export(
-            builder,
-            "affetto",
-            self.actuation.get_actuation_output_port(),
-            self.actuation.get_chamber_pressure_output_port(),
-            self.actuation.get_mass_flow_output_port(),
-        )
 
     def _add_sight(self, builder: DiagramBuilder) -> None:
         # The renderers stand in a copy of the scene: a SceneGraph hands each
@@ -520,37 +479,18 @@ class AffettoStation(Diagram):
         self, builder: DiagramBuilder, desired: OutputPort
     ) -> None:
         builder.ExportOutput(desired, "affetto.desired_state")
-        command = self.actuation.get_command_input_port()
-        if self.scenario.valve_source == "external":
+        if self.controller is None:
+            command = self.actuation.get_command_input_port()
             builder.ExportInput(command, f"affetto.{command.get_name()}")
             return
-        self.controller = PidfController.AddToBuilder(
-            builder=builder,
-            config=self.scenario.control,
-            joint_names=self.joints.names,
-        )
         self._offset = builder.AddNamedSystem(
             "equilibrium_offset",
             ConstantVectorSource(np.zeros(self.num_joints)),
         )
         builder.Connect(desired, self.controller.get_desired_state_input_port())
         builder.Connect(
-            self._estimated_state,
-            self.controller.get_estimated_state_input_port(),
-        )
-        connect(builder, self.actuation, self.controller, "chamber_pressure")
-        builder.Connect(
             self._offset.get_output_port(),
             self.controller.get_equilibrium_offset_input_port(),
-        )
-        builder.Connect(
-            self.controller.get_valve_opening_output_port(), command
-        )
-        _export(
-            builder,
-            "affetto",
-            self.controller.get_valve_opening_output_port(),
-            self.controller.get_pid_output_output_port(),
         )
 
     def set_equilibrium_offset(
