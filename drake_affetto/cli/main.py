@@ -32,6 +32,7 @@ COMMANDS = {
     "identify": "fit the actuators to a robot's logs",
     "tune": "tune the controllers' gains on the whole robot",
     "status": "show how far a study is",
+    "serve": "answer the real robot's own software in real time",
     "view": "show the robot in a browser, with sliders",
     "diagram": "draw a station's systems and their connections",
 }

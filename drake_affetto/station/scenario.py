@@ -173,6 +173,10 @@ class Scenario:
         valve_source: "pidf": the valves are controlled (Eq. 7). "external":
             `affetto.valve_opening` is an input of the station (or
             `affetto.pressure_command` with pressure regulators).
+        wire: YAML file of the robot's wire (see `robot.wire`); only where a
+            robot is spoken to, or is simulated behind its wire.
+        hardware: whether the station drives a robot over that wire, instead of
+            simulating one (see `robot.hardware_station`).
     """
 
     random_seed: int = 0
@@ -220,6 +224,8 @@ class Scenario:
     teaching: TeacherConfig = dataclasses.field(default_factory=TeacherConfig)
     motion_source: str = "skill"
     valve_source: str = "pidf"
+    wire: str = ""
+    hardware: bool = False
 
     def check(self, where: str = "scenario") -> None:
         """Checks everything that can be checked without building anything.
