@@ -99,10 +99,15 @@ def run(args: argparse.Namespace) -> int:
     scenario.random_seed = args.seed
     wire = check_served(scenario, args.rate)
     timeout = args.command_timeout or wire.command_timeout
-    meshcat = _start_meshcat() if args.meshcat else None
-    robot = SimulatedRobot(scenario, args.rate, meshcat)
     codec = PacketCodec(wire)
+    meshcat = _start_meshcat() if args.meshcat else None
     with contextlib.ExitStack() as stack:
+        recording = None
+        if args.record is not None:
+            recording = stack.enter_context(
+                WireRecording(args.record, codec.num_joints)
+            )
+        robot = SimulatedRobot(scenario, args.rate, meshcat)
         # Warm by now: from the first packet on time is real time.
         sockets = WireSockets(
             args.host,
@@ -111,15 +116,8 @@ def run(args: argparse.Namespace) -> int:
             allow_network=args.allow_network,
         )
         stack.callback(sockets.close)
-        recording = None
-        if args.record is not None:
-            recording = stack.enter_context(
-                WireRecording(args.record, codec.num_joints)
-            )
         inbox = CommandInbox(codec, timeout, wire.on_silence == "hold")
-        server = RobotServer(
-            robot, codec, inbox, sockets, args.rate, recording
-        )
+        server = RobotServer(robot, codec, inbox, sockets, args.rate, recording)
         for number in (signal.SIGINT, signal.SIGTERM):
             before = signal.signal(number, lambda *_: server.stop())
             stack.callback(signal.signal, number, before)
@@ -127,11 +125,7 @@ def run(args: argparse.Namespace) -> int:
             f"serving: {args.scenario}, {codec.num_joints} joints, sensors to "
             f"{args.host}:{args.sensor_port} at {args.rate:g} Hz, commands on "
             f"port {args.command_port}; after {timeout:g} s without commands "
-            + (
-                "the last one holds"
-                if inbox.holds
-                else "all chambers vent"
-            ),
+            + ("the last one holds" if inbox.holds else "all chambers vent"),
             flush=True,
         )
         server.run(args.seconds, _status_printer())

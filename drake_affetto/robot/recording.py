@@ -26,14 +26,14 @@ class WireRecording:
             # A line is handed to the system as it is finished.
             self._file = self._path.open("w", encoding="ascii", buffering=1)
         except OSError as error:
-            raise InputError(f"cannot write {path}: {error.strerror}") from error
+            raise InputError(
+                f"cannot write {path}: {error.strerror}"
+            ) from error
         names = ["rq", "rpa", "rpb", "ca", "cb"]
         header = [f"{name}{k}" for name in names for k in range(num_joints)]
         self._file.write(",".join(["t", *header]) + "\n")
 
-    def add(
-        self, time: float, sensors: Array, levels: Sequence[float]
-    ) -> None:
+    def add(self, time: float, sensors: Array, levels: Sequence[float]) -> None:
         """Adds a row.
 
         Args:

@@ -12,7 +12,7 @@ from drake_affetto.station.station import AffettoStation
 
 # Simulated time before the first tick, s: everything is compiled by then, and
 # the vented robot has come to rest.
-WARM_UP = 2.0
+WARM_UP = 5.0
 
 
 def check_served(scenario: Scenario, rate: float) -> RobotWire:
@@ -105,7 +105,9 @@ class SimulatedRobot:
 
     def command(self, pressure: Array) -> None:
         """Sets the regulators' set-points [p_a; p_b] (2n,), Pa absolute."""
-        self._command.GetMutableData().get_mutable_value().SetFromVector(pressure)
+        self._command.GetMutableData().get_mutable_value().SetFromVector(
+            pressure
+        )
 
     def advance(self) -> None:
         """Simulates one tick."""

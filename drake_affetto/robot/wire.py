@@ -156,7 +156,9 @@ class PacketCodec:
         swapped = self._span < 0.0
         pairs = 2 * np.arange(n)
         self._places = np.concatenate([pairs + swapped, pairs + ~swapped])
-        self._offsets = np.array([[j.offset_a, j.offset_b] for j in wire.joints])
+        self._offsets = np.array(
+            [[j.offset_a, j.offset_b] for j in wire.joints]
+        )
         self._levels = COMMAND_MAXIMUM / (wire.command_high - wire.command_low)
 
     def sensor_values(self, q: Array, pressure: Array) -> Array:
@@ -197,7 +199,9 @@ class PacketCodec:
         wire = self._wire
         percent, pairs = values[:, 0], values[:, 1:]
         # What is not a number fails these comparisons too.
-        if not np.all((percent >= wire.angle_low) & (percent <= wire.angle_high)):
+        if not np.all(
+            (percent >= wire.angle_low) & (percent <= wire.angle_high)
+        ):
             raise PacketError("an angle that cannot be")
         if not np.all(
             (pairs >= wire.pressure_low) & (pairs <= wire.pressure_high)

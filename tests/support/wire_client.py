@@ -22,7 +22,9 @@ STIFFNESS = 400.0
 
 def free_ports(count=2):
     """Ports that nobody uses right now."""
-    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
+    sockets = [
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)
+    ]
     try:
         for each in sockets:
             each.bind((HOST, 0))
@@ -106,9 +108,7 @@ class WireClient:
         if self._memory is None:
             self._memory = np.outer(lfilter_zi(b, a), q)
             self.filtered = q
-        new, self._memory = lfilter(
-            b, a, q[None], axis=0, zi=self._memory
-        )
+        new, self._memory = lfilter(b, a, q[None], axis=0, zi=self._memory)
         self.rate = (new[0] - self.filtered) * SENSOR_RATE
         self.filtered, self.raw = new[0], raw
 

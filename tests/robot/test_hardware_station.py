@@ -1,0 +1,125 @@
+"""The station with hardware, driving the simulated robot of another process."""
+
+import dataclasses
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
+import pytest
+
+from drake_affetto.common.errors import InputError
+from drake_affetto.robot.controller import load_robot_controller
+from drake_affetto.robot.hardware_station import HardwareStation, make_station
+from drake_affetto.robot.pid_system import RobotPid
+from drake_affetto.robot.wire import load_wire
+from drake_affetto.station.scenario import load_scenario
+from drake_affetto.station.station import AffettoStation
+from support.serving import serving
+from support.wire_client import free_ports
+
+SHARED = ("estimated_state", "chamber_pressure")
+ELBOW = 11
+
+
+def closed_loop(station, desired):
+    """One and the same diagram around either station."""
+    builder = DiagramBuilder()
+    builder.AddSystem(station)
+    pid = builder.AddSystem(RobotPid(load_robot_controller(), load_wire()))
+    wanted = builder.AddSystem(ConstantVectorSource(desired))
+    builder.Connect(wanted.get_output_port(), pid.GetInputPort("desired_state"))
+    builder.Connect(
+        station.GetOutputPort("affetto.estimated_state"),
+        pid.GetInputPort("estimated_state"),
+    )
+    builder.Connect(
+        pid.get_output_port(), station.GetInputPort("affetto.pressure_command")
+    )
+    return builder.Build()
+
+
+def hardware():
+    return dataclasses.replace(load_scenario("robot"), hardware=True)
+
+
+@pytest.fixture(scope="module")
+def wanted():
+    """The right elbow at 60 %, all others at the middle of the range."""
+    wire = load_wire()
+    share = np.full(13, 50.0)
+    share[ELBOW] = 60.0
+    at_0 = np.array([j.at_0 for j in wire.joints])
+    span = np.array([j.at_100 for j in wire.joints]) - at_0
+    return np.append(np.radians(at_0 + 0.01 * share * span), np.zeros(13))
+
+
+def test_one_diagram_drives_the_simulation_and_the_robot(wanted):
+    ends = {}
+    simulated = AffettoStation(load_scenario("robot"))
+    diagram = closed_loop(simulated, wanted)
+    simulator = Simulator(diagram)
+    context = simulator.get_mutable_context()
+    simulated.reset(context)
+    simulated.GetInputPort("affetto.desired_state").FixValue(
+        simulated.GetMyMutableContextFromRoot(context), np.zeros(26)
+    )
+    simulator.AdvanceTo(4.0)
+    ends["simulated"] = simulated.GetOutputPort("affetto.estimated_state").Eval(
+        simulated.GetMyContextFromRoot(context)
+    )
+
+    with serving() as server:
+        station = make_station(
+            hardware(),
+            sensor_port=server.sensor_port,
+            command_port=server.command_port,
+        )
+        assert isinstance(station, HardwareStation)
+        simulator = Simulator(closed_loop(station, wanted))
+        simulator.set_target_realtime_rate(1.0)
+        context = simulator.get_mutable_context()
+        station.wait(context)
+        simulator.AdvanceTo(4.0)
+        mine = station.GetMyContextFromRoot(context)
+        ends["robot"] = station.GetOutputPort("affetto.estimated_state").Eval(
+            mine
+        )
+        trusted, _, bad = station.GetOutputPort("affetto.link").Eval(mine)
+        assert (trusted, bad) == (1.0, 0.0)
+        station.close()
+        code, out, _ = server.end()
+        assert code == 0
+        assert " 0 bad, 1 clients" in out
+    span = np.radians(130.0)
+    for name, state in ends.items():
+        error = abs(state[ELBOW] - wanted[ELBOW]) / span
+        assert error < 0.15, name
+
+
+def test_both_stations_have_the_ports_of_the_wire():
+    ports = free_ports()
+    station = HardwareStation(
+        hardware(), sensor_port=ports[0], command_port=ports[1]
+    )
+    try:
+        simulated = AffettoStation(load_scenario("robot"))
+        for port in SHARED:
+            name = f"affetto.{port}"
+            assert (
+                station.GetOutputPort(name).size()
+                == simulated.GetOutputPort(name).size()
+            )
+        name = "affetto.pressure_command"
+        assert (
+            station.GetInputPort(name).size()
+            == simulated.GetInputPort(name).size()
+        )
+    finally:
+        station.close()
+
+
+def test_a_scenario_without_hardware_is_simulated():
+    assert isinstance(make_station(load_scenario("robot")), AffettoStation)
+    with pytest.raises(InputError, match="hardware is False"):
+        HardwareStation(load_scenario("robot"))
