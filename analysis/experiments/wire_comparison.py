@@ -1,7 +1,7 @@
 """The robot's logs beside the simulation's, both taken at the wire.
 
-Replays the references of the robot's logs over the wire of `affetto serve`
-(see `record_over_wire.py`), or takes logs that were made so, and compares lag,
+The simulation's logs are made over the wire of `affetto serve` from the
+references of the robot's (`tests/support/record_over_wire.py`). Compares lag,
 tracking error, the answer to the first steps of pressure, and settled
 pressures. Writes a table:
 

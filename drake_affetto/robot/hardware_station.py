@@ -29,8 +29,8 @@ class HardwareStation(Diagram):
     - affetto.estimated_state (2n): [q; q̇], filtered as the robot's own software
       does, rad, rad/s.
     - affetto.chamber_pressure (2n): [p_a; p_b] as read, Pa absolute.
-    - affetto.link (3): see `WireDriver`; while its first entry is 0 the robot is
-      vented whatever the command.
+    - affetto.link (3): see `WireDriver`; while its first entry is 0 the robot
+      is vented whatever the command.
 
     Camera and drum have no ports: they are not on this wire.
     """
@@ -95,12 +95,12 @@ class HardwareStation(Diagram):
             self.driver.get_pressure_command_input_port(),
             "affetto.pressure_command",
         )
-        for system, port in (
-            (self.filter, "estimated_state"),
-            (self.filter, "chamber_pressure"),
-            (self.driver, "link"),
+        for output in (
+            self.filter.get_estimated_state_output_port(),
+            self.filter.get_chamber_pressure_output_port(),
+            self.driver.get_link_output_port(),
         ):
-            builder.ExportOutput(system.GetOutputPort(port), f"affetto.{port}")
+            builder.ExportOutput(output, f"affetto.{output.get_name()}")
         builder.BuildInto(self)
         self.set_name("hardware_station")
 

@@ -155,6 +155,8 @@ class Scenario:
             active joints the start posture, of others where they are welded.
         active_joints: the joints that move, in the order of every vector; the
             others are welded.
+        joint_damping: viscous friction of joints where it is not the model's,
+            N m s/rad.
         yaw_joint: the active joint by which the gaze turns (q3).
         drum_region: where trials put the drum.
         camera, mirrors, rendering, blob, gaze: see `perception`.
@@ -197,6 +199,7 @@ class Scenario:
     active_joints: list[str] = dataclasses.field(
         default_factory=lambda: list(ACTIVE_JOINTS)
     )
+    joint_damping: dict[str, float] = dataclasses.field(default_factory=dict)
     yaw_joint: str = "waist_yaw"
     drum_region: DrumRegion = dataclasses.field(default_factory=DrumRegion)
     camera: CameraConfig = dataclasses.field(default_factory=CameraConfig)

@@ -38,6 +38,7 @@ from drake_affetto.perception.gaze_servo import GazeServo, gaze_view
 from drake_affetto.perception.mirror_camera import MirrorCamera
 from drake_affetto.pneumatics.actuation import PneumaticActuation
 from drake_affetto.scene import world
+from drake_affetto.scene.damping import set_joint_damping
 from drake_affetto.sensing.joint_sensors import JointSensors
 from drake_affetto.skill.policy import SkillPolicy
 from drake_affetto.sound.microphone import DrumMicrophone
@@ -152,6 +153,7 @@ class AffettoStation(Diagram):
         )
         world.add_world(self.plant, scenario.world)
         world.weld_inactive(self.plant, scenario.active_joints)
+        set_joint_damping(self.plant, scenario.joint_damping)
         self.plant.Finalize()
         self.joints = world.select_joints(self.plant, scenario.active_joints)
         self._yaw = scenario.active_joints.index(scenario.yaw_joint)
