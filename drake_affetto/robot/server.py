@@ -17,6 +17,8 @@ from drake_affetto.robot.wire import LONGEST_PACKET, PacketCodec
 # Packets that are read in a tick that is late already: a flood of them must
 # not delay it further.
 _WHILE_LATE = 64
+# Room for packets that wait, bytes.
+_BUFFER = 1 << 22
 
 
 class WireSockets:
@@ -57,6 +59,8 @@ class WireSockets:
                 f"--command-port {command_port} cannot be used on {own}: "
                 f"{error.strerror}"
             ) from error
+        # As much as the system grants: a burst that does not fit is dropped.
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
         self._socket.setblocking(False)
 
     def send(self, packet: bytes) -> None:
