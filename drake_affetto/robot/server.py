@@ -199,6 +199,9 @@ class RobotServer:
                         self._codec.sensor_values(q, pressure),
                         levels,
                     )
+                strike = self._robot.finished_strike()
+                if strike > 0.0:
+                    self.inbox.notes.append(f"the drum: {strike:.1f} N")
                 on_tick(self)
 
     def _receive_until_due(self) -> None:

@@ -91,6 +91,8 @@ class SimulatedRobot:
         desired.FixValue(self._context, np.zeros(2 * n))
         self._state = self.station.GetOutputPort("affetto.estimated_state")
         self._pressure = self.station.GetOutputPort("affetto.chamber_pressure")
+        self._drum = self.station.GetOutputPort("drum.contact_force")
+        self._strike = 0.0
         self._simulator = Simulator(self.station, self._context)
         ApplySimulatorConfig(scenario.simulator_config, self._simulator)
         self._simulator.set_target_realtime_rate(0.0)
@@ -119,3 +121,13 @@ class SimulatedRobot:
         n = self.station.num_joints
         state = self._state.Eval(self._context)
         return state[:n], self._pressure.Eval(self._context)
+
+    def finished_strike(self) -> float:
+        """Greatest force of a strike on the drum that is just over, N; else 0.
+
+        It looks at the drum once a call, so call it each tick.
+        """
+        force = float(self._drum.Eval(self._context)[0])
+        strike = 0.0 if force > 0.0 else self._strike
+        self._strike = max(self._strike, force) if force > 0.0 else 0.0
+        return strike

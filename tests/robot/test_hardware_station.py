@@ -1,23 +1,33 @@
 """The station with hardware, driving the simulated robot of another process."""
 
 import dataclasses
+import re
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource
+from pydrake.systems.primitives import ConstantVectorSource, TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial
 import pytest
 
 from drake_affetto.common.errors import InputError
+from drake_affetto.control.pidf import load_control
+from drake_affetto.control.pidf_controller import PidfController
+from drake_affetto.experiments.episode import TrialRunner
 from drake_affetto.robot.controller import load_robot_controller
 from drake_affetto.robot.hardware_station import HardwareStation, make_station
-from drake_affetto.robot.pid_system import RobotPid
+from drake_affetto.robot.pid_system import RobotPid, make_set_points
 from drake_affetto.robot.wire import load_wire
 from drake_affetto.station.scenario import load_scenario
 from drake_affetto.station.station import AffettoStation
 from support.serving import serving
 from support.wire_client import free_ports
 
+# A share of the gains of flow mode, where the inner loop is faster.
+GAIN = 0.5
+MEAN = 401.3e3  # Pa, 300 kPa gauge
+# Time in which the arm comes to the start of the stroke, s.
+APPROACH = 3.0
 SHARED = ("estimated_state", "chamber_pressure")
 ELBOW = 11
 
@@ -123,3 +133,77 @@ def test_a_scenario_without_hardware_is_simulated():
     assert isinstance(make_station(load_scenario("robot")), AffettoStation)
     with pytest.raises(InputError, match="hardware is False"):
         HardwareStation(load_scenario("robot"))
+
+
+def taught_stroke():
+    """A demonstration at the default place, replayed: t (T,), q (T, n)."""
+    scenario = load_scenario("drumming")
+    scenario.active_joints = load_wire().names
+    runner = TrialRunner(scenario)
+    xy = np.array(scenario.world.drum_position)
+    theta = runner.teach(xy, seed=0).theta
+    replay = runner.strike(xy, theta, seed=0)
+    fresh = np.append(True, np.diff(replay.joint_t) > 1e-6)
+    q = replay.desired_state[:, : len(scenario.active_joints)]
+    return replay.joint_t[fresh], q[fresh]
+
+
+def pidf_over_the_wire(station, t, q):
+    """Our controllers, their pressure differences mapped to set-points."""
+    config = station.scenario.control
+    parameters = load_control(config.parameters, config.overlays)
+    for gains in parameters.gains.values():
+        gains.kP, gains.kI, gains.kD = (
+            GAIN * each for each in (gains.kP, gains.kI, gains.kD)
+        )
+    builder = DiagramBuilder()
+    builder.AddSystem(station)
+    n = station.num_joints
+    path = PiecewisePolynomial.FirstOrderHold(
+        np.append(0.0, APPROACH + t - t[0]), np.vstack([q[:1], q]).T
+    )
+    source = builder.AddSystem(TrajectorySource(path, 1))
+    controller = PidfController.AddToBuilder(
+        builder=builder,
+        config=config,
+        joint_names=station.scenario.active_joints,
+        parameters=parameters,
+    )
+    mapping = builder.AddSystem(make_set_points(MEAN, n))
+    builder.Connect(
+        source.get_output_port(), controller.GetInputPort("desired_state")
+    )
+    for port in SHARED:
+        builder.Connect(
+            station.GetOutputPort(f"affetto.{port}"),
+            controller.GetInputPort(port),
+        )
+    builder.Connect(
+        controller.GetOutputPort("pid_output"), mapping.get_input_port()
+    )
+    builder.Connect(
+        mapping.get_output_port(),
+        station.GetInputPort("affetto.pressure_command"),
+    )
+    return builder.Build()
+
+
+@pytest.mark.slow
+def test_a_taught_stroke_sent_over_the_wire_strikes_the_simulated_drum():
+    t, q = taught_stroke()
+    with serving() as server:
+        station = HardwareStation(
+            hardware(),
+            sensor_port=server.sensor_port,
+            command_port=server.command_port,
+        )
+        simulator = Simulator(pidf_over_the_wire(station, t, q))
+        simulator.set_target_realtime_rate(1.0)
+        station.wait(simulator.get_mutable_context())
+        simulator.AdvanceTo(APPROACH + t[-1] - t[0])
+        station.close()
+        code, _, err = server.end()
+    assert code == 0
+    forces = [float(x) for x in re.findall(r"the drum: ([\d.]+) N", err)]
+    assert forces
+    assert max(forces) > 0.5
