@@ -179,6 +179,17 @@ def test_the_record_is_a_log(server):
     assert not log.has_reference
 
 
+@pytest.mark.slow
+def test_all_22_joints_are_served():
+    with serving("--scenario=robot_22") as server:
+        assert server.first.startswith("serving: robot_22, 22 joints")
+        ports = (server.sensor_port, server.command_port)
+        with WireClient(*ports, joints=22) as client:
+            seen = settle(client, np.full((22, 2), 170.0), 1.5)
+        assert seen.shape == (22, 3)
+        assert np.median(seen[:, 1:]) == pytest.approx(400.0, abs=5.0)
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
