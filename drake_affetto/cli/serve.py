@@ -72,11 +72,7 @@ def run(args: argparse.Namespace) -> int:
     """
     from drake_affetto.robot.command_inbox import CommandInbox
     from drake_affetto.robot.recording import WireRecording
-    from drake_affetto.robot.server import (
-        RobotServer,
-        WireSockets,
-        check_addresses,
-    )
+    from drake_affetto.robot.server import RobotServer, WireSockets
 
     require_range("--seed", args.seed, 0, 2**31 - 1)
     require_range("--rate", args.rate, 1.0, 400.0)
@@ -84,12 +80,17 @@ def run(args: argparse.Namespace) -> int:
         require_range("--seconds", args.seconds, 0.0, 1e7)
     if args.command_timeout is not None:
         require_range("--command-timeout", args.command_timeout, 0.05, 3600.0)
-    check_addresses(
-        args.host,
-        args.sensor_port,
-        args.command_port,
-        allow_network=args.allow_network,
-    )
+
+    def open_sockets() -> WireSockets:
+        return WireSockets(
+            args.host,
+            args.sensor_port,
+            args.command_port,
+            allow_network=args.allow_network,
+        )
+
+    # Only to see that it can be done, before anything takes its time.
+    open_sockets().close()
 
     from drake_affetto.robot.simulated_robot import SimulatedRobot, check_served
     from drake_affetto.robot.wire import PacketCodec
@@ -109,12 +110,7 @@ def run(args: argparse.Namespace) -> int:
             )
         robot = SimulatedRobot(scenario, args.rate, meshcat)
         # Warm by now: from the first packet on time is real time.
-        sockets = WireSockets(
-            args.host,
-            args.sensor_port,
-            args.command_port,
-            allow_network=args.allow_network,
-        )
+        sockets = open_sockets()
         stack.callback(sockets.close)
         inbox = CommandInbox(codec, timeout, wire.on_silence == "hold")
         server = RobotServer(robot, codec, inbox, sockets, args.rate, recording)

@@ -18,7 +18,7 @@ from drake_affetto.robot.wire import LONGEST_PACKET, PacketCodec
 # not delay it further.
 _WHILE_LATE = 64
 # Room for packets that wait, bytes.
-_BUFFER = 1 << 22
+_BUFFER = 1 << 20
 
 
 class WireSockets:
@@ -79,11 +79,17 @@ class WireSockets:
         Returns:
             The packet and the port that it came from; None without one.
         """
-        if not select.select([self._socket], [], [], max(0.0, timeout))[0]:
-            return None
         try:
-            # One byte more, so that what is too long is seen to be.
-            packet, sender = self._socket.recvfrom(LONGEST_PACKET + 1)
+            packet, sender = self._read()
+        except BlockingIOError:
+            # Asked only where nothing waits: a burst is read without.
+            wait = max(0.0, timeout)
+            if not select.select([self._socket], [], [], wait)[0]:
+                return None
+            try:
+                packet, sender = self._read()
+            except OSError:
+                return None
         except OSError:
             return None
         return (packet, sender[1]) if sender[0] == self.client[0] else None
@@ -91,6 +97,10 @@ class WireSockets:
     def close(self) -> None:
         """Closes the socket."""
         self._socket.close()
+
+    def _read(self) -> tuple[bytes, tuple[str, int]]:
+        # One byte more, so that what is too long is seen to be.
+        return self._socket.recvfrom(LONGEST_PACKET + 1)
 
 
 def check_addresses(

@@ -74,7 +74,7 @@ def test_one_diagram_drives_the_simulation_and_the_robot(wanted):
     simulated.GetInputPort("affetto.desired_state").FixValue(
         simulated.GetMyMutableContextFromRoot(context), np.zeros(26)
     )
-    simulator.AdvanceTo(4.0)
+    simulator.AdvanceTo(3.0)
     ends["simulated"] = simulated.GetOutputPort("affetto.estimated_state").Eval(
         simulated.GetMyContextFromRoot(context)
     )
@@ -90,7 +90,7 @@ def test_one_diagram_drives_the_simulation_and_the_robot(wanted):
         simulator.set_target_realtime_rate(1.0)
         context = simulator.get_mutable_context()
         station.wait(context)
-        simulator.AdvanceTo(4.0)
+        simulator.AdvanceTo(3.0)
         mine = station.GetMyContextFromRoot(context)
         ends["robot"] = station.GetOutputPort("affetto.estimated_state").Eval(
             mine
