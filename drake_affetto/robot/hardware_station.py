@@ -1,6 +1,7 @@
 """The station with hardware: the same ports, but a robot behind them."""
 
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.primitives import PassThrough
 
 from drake_affetto.common.errors import require, require_range
 from drake_affetto.robot.controller import load_robot_controller
@@ -19,12 +20,15 @@ class HardwareStation(Diagram):
 
         name: HardwareStation
         input_ports:
+        - affetto.desired_state
         - affetto.pressure_command
         output_ports:
+        - affetto.desired_state
         - affetto.estimated_state
         - affetto.chamber_pressure
         - affetto.link
 
+    - affetto.desired_state (2n): rad, rad/s; handed on, as in the simulation.
     - affetto.pressure_command (2n): set-points [p_a; p_b], Pa absolute.
     - affetto.estimated_state (2n): [q; q̇], filtered as the robot's own software
       does, rad, rad/s.
@@ -91,6 +95,11 @@ class HardwareStation(Diagram):
             period=1.0 / controller.sensor_rate,
             name="filter",
         )
+        desired = builder.AddNamedSystem(
+            "desired_state", PassThrough(2 * len(wire.joints))
+        )
+        builder.ExportInput(desired.get_input_port(), "affetto.desired_state")
+        builder.ExportOutput(desired.get_output_port(), "affetto.desired_state")
         builder.ExportInput(
             self.driver.get_pressure_command_input_port(),
             "affetto.pressure_command",

@@ -38,11 +38,13 @@ def closed_loop(station, desired):
     builder.AddSystem(station)
     pid = builder.AddSystem(RobotPid(load_robot_controller(), load_wire()))
     wanted = builder.AddSystem(ConstantVectorSource(desired))
-    builder.Connect(wanted.get_output_port(), pid.GetInputPort("desired_state"))
     builder.Connect(
-        station.GetOutputPort("affetto.estimated_state"),
-        pid.GetInputPort("estimated_state"),
+        wanted.get_output_port(), station.GetInputPort("affetto.desired_state")
     )
+    for port in ("desired_state", "estimated_state"):
+        builder.Connect(
+            station.GetOutputPort(f"affetto.{port}"), pid.GetInputPort(port)
+        )
     builder.Connect(
         pid.get_output_port(), station.GetInputPort("affetto.pressure_command")
     )
@@ -71,9 +73,6 @@ def test_one_diagram_drives_the_simulation_and_the_robot(wanted):
     simulator = Simulator(diagram)
     context = simulator.get_mutable_context()
     simulated.reset(context)
-    simulated.GetInputPort("affetto.desired_state").FixValue(
-        simulated.GetMyMutableContextFromRoot(context), np.zeros(26)
-    )
     simulator.AdvanceTo(3.0)
     ends["simulated"] = simulated.GetOutputPort("affetto.estimated_state").Eval(
         simulated.GetMyContextFromRoot(context)
@@ -114,17 +113,18 @@ def test_both_stations_have_the_ports_of_the_wire():
     )
     try:
         simulated = AffettoStation(load_scenario("robot"))
-        for port in SHARED:
+        for port in (*SHARED, "desired_state"):
             name = f"affetto.{port}"
             assert (
                 station.GetOutputPort(name).size()
                 == simulated.GetOutputPort(name).size()
             )
-        name = "affetto.pressure_command"
-        assert (
-            station.GetInputPort(name).size()
-            == simulated.GetInputPort(name).size()
-        )
+        for port in ("pressure_command", "desired_state"):
+            name = f"affetto.{port}"
+            assert (
+                station.GetInputPort(name).size()
+                == simulated.GetInputPort(name).size()
+            )
     finally:
         station.close()
 
