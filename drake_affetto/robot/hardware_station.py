@@ -4,6 +4,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.primitives import PassThrough
 
 from drake_affetto.common.errors import require, require_range
+from drake_affetto.common.systems import export
 from drake_affetto.robot.controller import load_robot_controller
 from drake_affetto.robot.wire import load_wire
 from drake_affetto.robot.wire_driver import WireDriver
@@ -104,12 +105,13 @@ class HardwareStation(Diagram):
             self.driver.get_pressure_command_input_port(),
             "affetto.pressure_command",
         )
-        for output in (
+        export(
+            builder,
+            "affetto",
             self.filter.get_estimated_state_output_port(),
             self.filter.get_chamber_pressure_output_port(),
             self.driver.get_link_output_port(),
-        ):
-            builder.ExportOutput(output, f"affetto.{output.get_name()}")
+        )
         builder.BuildInto(self)
         self.set_name("hardware_station")
 

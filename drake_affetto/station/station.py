@@ -27,7 +27,7 @@ from pydrake.systems.primitives import (
 from pydrake.systems.sensors import CameraInfo
 
 from drake_affetto.common.errors import require
-from drake_affetto.common.systems import connect
+from drake_affetto.common.systems import connect, export
 from drake_affetto.control.pidf_controller import PidfController
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.motion.dmp_source import DmpSource
@@ -422,7 +422,7 @@ class AffettoStation(Diagram):
             spread.get_output_port(),
             self.plant.get_actuation_input_port(self._robot),
         )
-        _export(
+        export(
             builder,
             "affetto",
             self.actuation.get_actuation_output_port(),
@@ -466,7 +466,7 @@ class AffettoStation(Diagram):
                 color_image=self.camera.get_color_image_output_port(),
                 config=self.scenario.blob,
             )
-        _export(
+        export(
             builder,
             "camera",
             self.camera.get_color_image_output_port(),
@@ -479,7 +479,7 @@ class AffettoStation(Diagram):
         self.microphone = DrumMicrophone.AddToBuilder(
             builder=builder, plant=self.plant
         )
-        _export(
+        export(
             builder,
             "drum",
             self.microphone.get_contact_force_output_port(),
@@ -531,7 +531,7 @@ class AffettoStation(Diagram):
             "policy_parameters",
             "start_time",
         )
-        _export(
+        export(
             builder,
             "affetto",
             self.policy.get_policy_parameters_output_port(),
@@ -579,7 +579,7 @@ class AffettoStation(Diagram):
         builder.Connect(
             self.controller.get_valve_opening_output_port(), command
         )
-        _export(
+        export(
             builder,
             "affetto",
             self.controller.get_valve_opening_output_port(),
@@ -594,9 +594,3 @@ class AffettoStation(Diagram):
             self._sub(self._offset, context)
         )
         value.SetFromVector(np.asarray(offset, float))
-
-
-def _export(builder: DiagramBuilder, part: str, *ports: OutputPort) -> None:
-    """Exports output ports under their own names, as parts of the robot."""
-    for port in ports:
-        builder.ExportOutput(port, f"{part}.{port.get_name()}")
