@@ -26,6 +26,7 @@ ORDER = [
     {"motion"},
     {"control"},
     {"pneumatics"},
+    {"sensing"},
     {"sound"},
     {"teaching"},
     {"station", "scenario"},
@@ -39,7 +40,7 @@ ORDER = [
     {"cli"},
 ]
 RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
-STAGES = [name for names in ORDER[1:10] for name in names]
+STAGES = [name for names in ORDER[1:11] for name in names]
 
 # The mathematics, which must also serve who has no Drake. The test adds to
 # them every module of a stage that does not import Drake in its own text.
@@ -55,6 +56,7 @@ DRAKE_FREE = {
     "drake_affetto.pneumatics.flow",
     "drake_affetto.common.resources",
     "drake_affetto.geometry.kinematics",
+    "drake_affetto.sensing.readings",
     "drake_affetto.skill.elm",
     "drake_affetto.sound.voice",
     "drake_affetto.teaching.stroke",
@@ -378,6 +380,7 @@ TESTED_IN = {
     "cli/drum": "cli/test_study_command.py",
     "cli/identify": "identification/test_study.py",
     "cli/mirror": "cli/test_study_command.py",
+    "cli/serve": "robot/test_server.py",
     "cli/tune": "tuning/test_study.py",
     "envs/scene_picture": "envs/test_drum.py",
     "experiments/media": "experiments/test_demo.py",
@@ -393,7 +396,10 @@ TESTED_IN = {
     "report/parts": "report/test_page.py",
     "report/report_data": "report/test_page.py",
     "report/sections": "report/test_page.py",
+    "robot/recording": "robot/test_server.py",
+    "robot/simulated_robot": "robot/test_server.py",
     "runner/progress": "runner/test_executor.py",
+    "station/gaze_turn": "station/test_station.py",
     "skill/optical": "perception/test_optical_map.py",
     "skill/residuals": "skill/test_transfer.py",
     "skill/search": "skill/test_transfer.py",
@@ -410,6 +416,7 @@ TESTED_IN = {
 MORE_TESTS = {
     "experiments/test_workspace_images.py": "experiments/workspace",
     "report/test_browser.py": "report/page",
+    "robot/test_robot_software.py": "robot/log",
     "scene/test_contact.py": "scene/world",
     "scene/test_models.py": "scene/world",
     "scene/test_world_frames.py": "scene/world",

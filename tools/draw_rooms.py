@@ -28,7 +28,7 @@ _COLORS = {
     "#e6e6e6": ("common", "geometry"),
     "#cfe3f7": ("scene", "perception"),
     "#dcd3f2": ("skill", "motion"),
-    "#fbeeb8": ("control", "pneumatics"),
+    "#fbeeb8": ("control", "pneumatics", "sensing"),
     "#d3efd0": ("sound", "teaching"),
     "#f7d4e3": ("station",),
     "#fbdcc4": ("robot", "runner", "experiments", "tuning", "identification"),

@@ -70,6 +70,18 @@ def connect(
         builder.Connect(source.GetOutputPort(name), target.GetInputPort(name))
 
 
+def export(builder: DiagramBuilder, part: str, *ports: OutputPort) -> None:
+    """Exports outputs as `part.name`, under the names that they have.
+
+    Args:
+        builder: Builder that has their systems.
+        part: Part of the robot or the scene to which they belong.
+        ports: Outputs.
+    """
+    for port in ports:
+        builder.ExportOutput(port, f"{part}.{port.get_name()}")
+
+
 class _Getter:
     """Stands for a method until its class gives it a name."""
 

@@ -85,6 +85,7 @@ class DrumEnv(gymnasium.Env):
         if render_mode == "human":
             self._runners[scenario] = TrialRunner(self._scenario, open_window())
         self._xy: Array | None = None
+        self._seed = 0
         self._observation = np.zeros(2, np.float32)
         self._picture: Image | None = None
 
@@ -97,7 +98,7 @@ class DrumEnv(gymnasium.Env):
             InputError: If the drum cannot be seen there.
         """
         super().reset(seed=seed)
-        self._xy, tau = look_at_new_place(
+        self._xy, tau, self._seed = look_at_new_place(
             self._name, self._scenario, self.np_random, options, self._runners
         )
         self._observation = scaled_tau(self._scenario, tau)
@@ -120,7 +121,7 @@ class DrumEnv(gymnasium.Env):
             trials.strike(
                 self._name,
                 self._xy.tolist(),
-                int(self.np_random.integers(2**31)),
+                self._seed,
                 theta,
                 self._prototypes,
             )
@@ -187,8 +188,8 @@ def look_at_new_place(
     rng: np.random.Generator,
     options: dict[str, Any] | None,
     runners: dict[str, TrialRunner],
-) -> tuple[Array, list[float]]:
-    """Puts the drum where the gaze finds it; gives the place and τ.
+) -> tuple[Array, list[float], int]:
+    """Puts the drum where the gaze finds it; gives place, τ and trial's seed.
 
     Args:
         name: Name or path of the scenario.
@@ -212,7 +213,7 @@ def look_at_new_place(
         seen = trials.run_trial(trials.look(name, xy.tolist(), seed), runners)
         assert isinstance(seen, GazeResult)
         if seen.found:
-            return xy, seen.tau
+            return xy, seen.tau, seed
     raise InputError(
         f"the gaze does not find the drum at {xy.tolist()} in {name!r}"
     )

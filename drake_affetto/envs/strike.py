@@ -147,7 +147,7 @@ class StrikeEnv(gymnasium.Env):
         """
         super().reset(seed=seed)
         # Another station looks: this one has no gaze.
-        xy, tau = look_at_new_place(
+        xy, tau, trial_seed = look_at_new_place(
             self._name, self._scenario, self.np_random, options, {}
         )
         self._tau = scaled_tau(self._scenario, tau)
@@ -156,7 +156,7 @@ class StrikeEnv(gymnasium.Env):
             self._lesson = self._lessons.q[int(away.argmin())]
         self._target = self._station.start_posture
         self._command(self._target, 0.0 * self._target)
-        self._begin = self._runner.settle(xy)
+        self._begin = self._runner.settle(xy, trial_seed)
         self._step = 0
         return self._observe(), {}
 

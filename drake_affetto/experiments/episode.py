@@ -203,20 +203,21 @@ class TrialRunner:
 
         Args:
             xy: Position of the drum (2,), m.
-            seed: Seed of the camera's noise.
+            seed: Seed of the trial: of the camera's noise and the robot's
+                variation.
             on_frame: Called every 0.05 s with the time since the beginning,
                 e.g. to film the search.
             linger: Time for which the simulation goes on after the end of the
                 search, s.
         """
-        begin = self.settle(xy)
+        begin = self.settle(xy, seed)
         # The gaze alone: no movement starts within any trial's time.
         self.station.policy.set_policy_parameters(
             self._sub(self.station.policy),
             np.zeros(self.station.num_joints * self.dmp.n_basis),
             begin + 1e6,
         )
-        self._enable_gaze(seed)
+        self._enable_gaze()
         outcome = self._wait_for_gaze(begin, on_frame)
         end = self.context.get_time() + linger
         while self.context.get_time() < end - 1e-9:
@@ -240,13 +241,13 @@ class TrialRunner:
 
         Args:
             xy: Position of the drum (2,), m.
-            seed: Seed of the teacher's variation.
+            seed: Seed of the teacher's and the robot's variation.
             attempt: Number of earlier attempts at this position.
             variability: Factor of the teacher's variation.
         """
         teaching = self.scenario.teaching.varied(variability)
         station = self.station
-        grasped = self._soften(xy)
+        grasped = self._soften(xy, seed)
         stroke = draw_stroke(
             teaching,
             station.touching_position(self.context),
@@ -256,10 +257,10 @@ class TrialRunner:
         station.teacher.set_stroke(self._sub(station.teacher), stroke, grasped)
         return self._record_guidance(grasped)
 
-    def _soften(self, xy: Array) -> float:
+    def _soften(self, xy: Array, seed: int) -> float:
         """Makes the arm compliant (paper Eq. 8); returns the time, s."""
         teaching, station = self.scenario.teaching, self.station
-        begin = self.settle(xy)
+        begin = self.settle(xy, seed)
         # What holds the arm at rest will hold it while it is guided.
         self.advance(begin + teaching.settling_time)
         u_eq = self._log("affetto.pid_output")[1].mean(axis=0)
@@ -292,9 +293,9 @@ class TrialRunner:
         Args:
             xy: Position of the drum (2,), m.
             theta: Parameters θ of the movement (n·K,).
-            seed: Seed of the microphone's noise.
+            seed: Seed of the microphone's noise and the robot's variation.
         """
-        begin = self.settle(xy)
+        begin = self.settle(xy, seed)
         start = begin + self.scenario.policy.delay
         self.station.policy.set_policy_parameters(
             self._sub(self.station.policy), theta, start
@@ -309,16 +310,17 @@ class TrialRunner:
         Args:
             xy: Position of the drum (2,), m.
             regressor: Skill, from task parameters to θ.
-            seed: Seed of the camera's and the microphone's noise.
+            seed: Seed of the camera's and the microphone's noise, and of the
+                robot's variation.
 
         Returns:
             The outcome of the gaze, and the recording (None if the drum was
             not found).
         """
-        begin = self.settle(xy)
+        begin = self.settle(xy, seed)
         policy = self._sub(self.station.policy)
         self.station.policy.set_regressor(policy, regressor)
-        self._enable_gaze(seed)
+        self._enable_gaze()
         outcome = self._wait_for_gaze(begin)
         if not outcome.found:
             return outcome, None
@@ -341,8 +343,11 @@ class TrialRunner:
     def _sub(self, system) -> Context:
         return system.GetMyMutableContextFromRoot(self.context)
 
-    def settle(self, xy: Array) -> float:
-        """Starts a trial: robot at rest, drum at xy, m; gives the time, s."""
+    def settle(self, xy: Array, seed: int) -> float:
+        """Starts a trial: robot at rest, drum at xy, m; gives the time, s.
+
+        The seed is that of all that differs from trial to trial.
+        """
         if self._settled is None:
             station = self.station
             station.reset(self._station_context)
@@ -352,6 +357,7 @@ class TrialRunner:
             self._settled = self.context.Clone()
         self._restore(self._settled)
         self.station.set_drum_position(self._station_context, xy)
+        self.station.set_seed(self._station_context, seed)
         self._clear_logs()
         self.simulator.Initialize()
         return self.context.get_time()
@@ -371,10 +377,8 @@ class TrialRunner:
                     system.GetMyContextFromRoot(settled)
                 )
 
-    def _enable_gaze(self, seed: int) -> None:
-        gaze, camera = self.station.gaze, self.station.camera
-        gaze.set_enabled(self._sub(gaze), True)
-        camera.set_seed(self._sub(camera), seed)
+    def _enable_gaze(self) -> None:
+        self.station.gaze.set_enabled(self._sub(self.station.gaze), True)
 
     def _wait_for_gaze(
         self, begin: float, on_frame: Callable[[float], None] | None = None

@@ -42,7 +42,7 @@ class MouseTeachingRunner(TrialRunner):
         Args:
             xy: Position of the drum (2,), m.
         """
-        self._soften(xy)
+        self._soften(xy, self.scenario.random_seed)
         self._show_stroke()
         # A person who still holds the hand has to let go of it first.
         self._wait(held=False)

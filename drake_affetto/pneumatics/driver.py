@@ -16,7 +16,7 @@ Drake's kind name it by its tag among their `model_drivers`:
               elbow: {kP: 5.0e5, kI: 3.0e5, kD: 2.5e4, kF: 1.5e-5}
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 import dataclasses
 from typing import Any
 
@@ -62,6 +62,11 @@ from drake_affetto.scene.joints import (
     joint_names,
     select_joints,
 )
+
+# Joints, and the ports of [q; q̇] and of [p_a; p_b], to both ports as read.
+Sense = Callable[
+    [JointSelection, OutputPort, OutputPort], tuple[OutputPort, OutputPort]
+]
 
 
 @dataclasses.dataclass
@@ -110,6 +115,8 @@ class PneumaticSystems:
         actuation: `PneumaticActuation`, or its continuous version in a
             continuous plant.
         controller: `PidfController`, or its continuous version, or None.
+        estimated_state: Port of [q; q̇] (2n), as read.
+        chamber_pressure: Port of [p_a; p_b] (2n), as read.
     """
 
     plant: MultibodyPlant
@@ -117,6 +124,8 @@ class PneumaticSystems:
     joint_state: LeafSystem
     actuation: Any
     controller: Any
+    estimated_state: OutputPort
+    chamber_pressure: OutputPort
 
     def hold_posture(self, diagram: Diagram, context: Context) -> None:
         """Makes the joints rest where they are.
@@ -191,11 +200,15 @@ def AddPneumaticDriver(
     plant: MultibodyPlant,
     model_instance: ModelInstanceIndex,
     builder: DiagramBuilder,
+    sense: Sense | None = None,
 ) -> PneumaticSystems:
     """Adds a model's pneumatics, for a diagram that has the command itself.
 
     It is `ApplyPneumaticDriver`, which names arguments, outputs and errors, but
-    for the inputs: they are left to be connected.
+    for the inputs: they are left to be connected. And sensors may stand between
+    the joints and whoever reads them: `sense` adds them, given the joints and
+    the ports of their true state and chamber pressure, and returns the ports of
+    both as read.
     """
     model = plant.GetModelInstanceName(model_instance)
     config.check(model)
@@ -207,14 +220,20 @@ def AddPneumaticDriver(
     builder.Connect(
         plant.get_state_output_port(model_instance), state.get_input_port()
     )
-    estimated = state.get_output_port()
-    builder.ExportOutput(estimated, f"{model}.estimated_state")
+    true_state = state.get_output_port()
     actuation = _add_actuation(
-        config.pneumatics, parameters, plant, joints, builder, estimated
+        config.pneumatics, parameters, plant, joints, builder, true_state
     )
+    read = true_state, actuation.get_chamber_pressure_output_port()
+    if sense is not None:
+        read = sense(joints, *read)
+    for port, name in zip(
+        read, ("estimated_state", "chamber_pressure"), strict=True
+    ):
+        builder.ExportOutput(port, f"{model}.{name}")
     outputs = [
         actuation.GetOutputPort(name)
-        for name in ("actuation", "chamber_pressure", "mass_flow")
+        for name in ("actuation", "mass_flow")
         if actuation.HasOutputPort(name)
     ]
     controller = None
@@ -225,15 +244,14 @@ def AddPneumaticDriver(
             plant,
             model,
             builder,
-            estimated,
-            actuation.get_chamber_pressure_output_port(),
+            *read,
         )
         opening = controller.get_valve_opening_output_port()
         builder.Connect(opening, actuation.get_command_input_port())
         outputs += [opening, controller.get_pid_output_output_port()]
     for port in outputs:
         builder.ExportOutput(port, f"{model}.{port.get_name()}")
-    return PneumaticSystems(plant, joints, state, actuation, controller)
+    return PneumaticSystems(plant, joints, state, actuation, controller, *read)
 
 
 def ApplyPneumaticDriver(

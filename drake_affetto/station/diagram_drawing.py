@@ -33,6 +33,7 @@ STAGE_COLORS = {
     "motion": "#f7d4e3",
     "control": "#fbdcc4",
     "pneumatics": "#fbeeb8",
+    "sensing": "#fbeeb8",
     "sound": "#d3efd0",
     "teaching": "#cdeeea",
 }

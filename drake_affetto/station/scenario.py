@@ -30,6 +30,7 @@ from drake_affetto.pneumatics.actuation import PneumaticActuationConfig
 from drake_affetto.scene.world import ACTIVE_JOINTS, WorldConfig
 from drake_affetto.skill.policy import SkillPolicyConfig
 from drake_affetto.sound.config import load_sound_config
+from drake_affetto.station.variation import VariationConfig
 from drake_affetto.teaching.stroke import TeacherConfig
 
 LONGEST_STEP = 5e-3
@@ -154,6 +155,8 @@ class Scenario:
             active joints the start posture, of others where they are welded.
         active_joints: the joints that move, in the order of every vector; the
             others are welded.
+        joint_damping: viscous friction of joints where it is not the model's,
+            N m s/rad.
         yaw_joint: the active joint by which the gaze turns (q3).
         drum_region: where trials put the drum.
         camera, mirrors, rendering, blob, gaze: see `perception`.
@@ -163,6 +166,8 @@ class Scenario:
         dmp: see `motion`.
         control: see `control`.
         pneumatics: see `pneumatics`.
+        variation: whether the robot varies from trial to trial as the real one
+            does; see `variation`.
         sound: YAML file of the drum's voice and of the reward.
         teaching: see `teaching`.
         motion_source: "skill": the robot looks, and moves as its skill says.
@@ -170,6 +175,10 @@ class Scenario:
         valve_source: "pidf": the valves are controlled (Eq. 7). "external":
             `affetto.valve_opening` is an input of the station (or
             `affetto.pressure_command` with pressure regulators).
+        wire: YAML file of the robot's wire (see `robot.wire`); only where a
+            robot is spoken to, or is simulated behind its wire.
+        hardware: whether the station drives a robot over that wire, instead of
+            simulating one (see `robot.hardware_station`).
     """
 
     random_seed: int = 0
@@ -190,6 +199,7 @@ class Scenario:
     active_joints: list[str] = dataclasses.field(
         default_factory=lambda: list(ACTIVE_JOINTS)
     )
+    joint_damping: dict[str, float] = dataclasses.field(default_factory=dict)
     yaw_joint: str = "waist_yaw"
     drum_region: DrumRegion = dataclasses.field(default_factory=DrumRegion)
     camera: CameraConfig = dataclasses.field(default_factory=CameraConfig)
@@ -210,10 +220,15 @@ class Scenario:
     pneumatics: PneumaticActuationConfig = dataclasses.field(
         default_factory=PneumaticActuationConfig
     )
+    variation: VariationConfig = dataclasses.field(
+        default_factory=VariationConfig
+    )
     sound: str = "package://drake_affetto/sound.yaml"
     teaching: TeacherConfig = dataclasses.field(default_factory=TeacherConfig)
     motion_source: str = "skill"
     valve_source: str = "pidf"
+    wire: str = ""
+    hardware: bool = False
 
     def check(self, where: str = "scenario") -> None:
         """Checks everything that can be checked without building anything.

@@ -20,15 +20,13 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 from pydrake.systems.primitives import (
-    Adder,
     ConstantVectorSource,
-    MatrixGain,
     PassThrough,
 )
 from pydrake.systems.sensors import CameraInfo
 
 from drake_affetto.common.errors import require
-from drake_affetto.common.systems import connect
+from drake_affetto.common.systems import connect, export
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.motion.dmp_source import DmpSource
 from drake_affetto.perception.analytic_blob_sensor import AnalyticBlobSensor
@@ -43,8 +41,11 @@ from drake_affetto.pneumatics.driver import (
 )
 from drake_affetto.pneumatics.parameters import JointActuator
 from drake_affetto.scene import world
+from drake_affetto.scene.damping import set_joint_damping
+from drake_affetto.sensing.joint_sensors import JointSensors
 from drake_affetto.skill.policy import SkillPolicy
 from drake_affetto.sound.microphone import DrumMicrophone
+from drake_affetto.station.gaze_turn import add_gaze_turn
 from drake_affetto.station.scenario import Scenario
 from drake_affetto.teaching.kinesthetic_teacher import KinestheticTeacher
 from drake_affetto.teaching.mouse_teacher import MouseTeacher
@@ -71,6 +72,7 @@ class AffettoStation(Diagram):
         - affetto.valve_opening (valve_source external, flow mode)
         - affetto.pressure_command (valve_source external, regulator mode)
         output_ports:
+        - affetto.joint_state
         - affetto.estimated_state
         - affetto.desired_state
         - affetto.valve_opening
@@ -92,12 +94,13 @@ class AffettoStation(Diagram):
 
     With n active joints, in the scenario's order:
 
-    - affetto.estimated_state, affetto.desired_state (2n): rad, rad/s, both at
-      the same time (see `joint_state`).
+    - affetto.joint_state, affetto.desired_state (2n): rad, rad/s, both at the
+      same time (see `joint_state`).
+    - affetto.estimated_state (2n): the same as the robot's sensors have it.
     - affetto.valve_opening (n): v⁺ in [-1, 1].
     - affetto.pid_output (n): u_PID, Pa.
     - affetto.actuation (n): N m.
-    - affetto.chamber_pressure (2n): [p_a; p_b], Pa absolute.
+    - affetto.chamber_pressure (2n): [p_a; p_b] as read, Pa absolute.
     - affetto.mass_flow (2n): into the chambers, kg/s.
     - affetto.policy_parameters (n·K): θ, rad/s².
     - affetto.start_time (1): when θ is played, s.
@@ -152,6 +155,7 @@ class AffettoStation(Diagram):
         )
         world.add_world(self.plant, scenario.world)
         world.weld_inactive(self.plant, scenario.active_joints)
+        set_joint_damping(self.plant, scenario.joint_damping)
         self.plant.Finalize()
         self._yaw = scenario.active_joints.index(scenario.yaw_joint)
         self._robot = world.robot_instance(self.plant)
@@ -160,7 +164,9 @@ class AffettoStation(Diagram):
         self.actuation = self.pneumatics.actuation
         self.controller = self.pneumatics.controller
         self._joint_state = self.pneumatics.joint_state
-        self._estimated_state = self._joint_state.get_output_port()
+        self._true_state = self._joint_state.get_output_port()
+        builder.ExportOutput(self._true_state, "affetto.joint_state")
+        self._estimated_state = self.pneumatics.estimated_state
         self.start_posture = np.array(
             [
                 world.get_joint(self.plant, name).get_default_angle()
@@ -218,6 +224,8 @@ class AffettoStation(Diagram):
         mine = self._mine(context)
         self.SetDefaultContext(mine)
         self.pneumatics.hold_posture(self, mine)
+        self.set_seed(context, self.scenario.random_seed)
+        self._reset_sensors(context)
         if self.scenario.motion_source == "skill":
             look = self.scenario.look
             self.gaze.set_task(
@@ -280,6 +288,24 @@ class AffettoStation(Diagram):
         self._joint_state.SetDefaultContext(
             self._sub(self._joint_state, context)
         )
+        self._reset_sensors(context)
+
+    def set_seed(self, context: Context, seed: int) -> None:
+        """Sets the seed of all that differs from trial to trial."""
+        self.camera.set_seed(self._sub(self.camera, context), seed)
+        if self.sensors is not None:
+            self.sensors.set_seed(self._sub(self.sensors, context), seed)
+
+    def _reset_sensors(self, context: Context) -> None:
+        """Lets the sensors read a robot that has just been put at rest."""
+        if self.sensors is not None:
+            self.sensors.reset(
+                self._sub(self.sensors, context),
+                self._true_state.Eval(self._sub(self._joint_state, context)),
+                self.actuation.get_chamber_pressure_output_port().Eval(
+                    self._sub(self.actuation, context)
+                ),
+            )
 
     def _mine(self, context: Context) -> Context:
         """The station's context, from itself or from the root's."""
@@ -296,6 +322,32 @@ class AffettoStation(Diagram):
     def _add_pneumatics(self, builder: DiagramBuilder) -> PneumaticSystems:
         scenario = self.scenario
         controlled = scenario.valve_source == "pidf"
+        self.sensors: JointSensors | None = None
+
+        def sense(
+            joints: world.JointSelection,
+            state: OutputPort,
+            pressure: OutputPort,
+        ) -> tuple[OutputPort, OutputPort]:
+            """Adds the sensors; returns [q; q̇] and [p_a; p_b] as read."""
+            self.sensors = JointSensors.AddToBuilder(
+                builder=builder,
+                joint_state=state,
+                true_pressure=pressure,
+                parameters=scenario.variation.load().sensors,
+                joint_names=joints.names,
+                q_lower=joints.lower,
+                q_upper=joints.upper,
+                period=scenario.control.period,
+                # With the actuators' update: the joints are by then those of
+                # the tick, the pressures those of one step before.
+                lead=0.5 * scenario.plant_config.time_step,
+            )
+            return (
+                self.sensors.get_estimated_state_output_port(),
+                self.sensors.get_chamber_pressure_output_port(),
+            )
+
         return AddPneumaticDriver(
             PneumaticDriver(
                 joints={
@@ -307,6 +359,7 @@ class AffettoStation(Diagram):
             self.plant,
             self._robot,
             builder,
+            sense if scenario.variation.enabled else None,
         )
 
     def _add_teacher(
@@ -330,7 +383,7 @@ class AffettoStation(Diagram):
                 config=teaching,
             )
             builder.Connect(
-                self._estimated_state,
+                self._true_state,
                 self.teacher.get_estimated_state_input_port(),
             )
             pull = self.teacher.get_pulling_force_output_port()
@@ -373,7 +426,7 @@ class AffettoStation(Diagram):
                 color_image=self.camera.get_color_image_output_port(),
                 config=self.scenario.blob,
             )
-        _export(
+        export(
             builder,
             "camera",
             self.camera.get_color_image_output_port(),
@@ -386,7 +439,7 @@ class AffettoStation(Diagram):
         self.microphone = DrumMicrophone.AddToBuilder(
             builder=builder, plant=self.plant
         )
-        _export(
+        export(
             builder,
             "drum",
             self.microphone.get_contact_force_output_port(),
@@ -438,7 +491,7 @@ class AffettoStation(Diagram):
             "policy_parameters",
             "start_time",
         )
-        _export(
+        export(
             builder,
             "affetto",
             self.policy.get_policy_parameters_output_port(),
@@ -446,34 +499,13 @@ class AffettoStation(Diagram):
             self.gaze.get_task_parameter_output_port(),
             self.gaze.get_settled_output_port(),
         )
-        return self._add_gaze_turn(
-            builder, self.dmp_source.get_desired_state_output_port()
+        return add_gaze_turn(
+            builder,
+            self.dmp_source.get_desired_state_output_port(),
+            self.gaze.get_yaw_command_output_port(),
+            self._yaw,
+            self.start_posture[self._yaw],
         )
-
-    def _add_gaze_turn(
-        self, builder: DiagramBuilder, movement: OutputPort
-    ) -> OutputPort:
-        """Adds the gaze's turn to the movement; returns [q; q̇] desired.
-
-        The gaze turns the yaw away from the movement's yaw. It returns when
-        it is done, so that only the movement is left.
-        """
-        n = self.num_joints
-        turn = np.zeros((2 * n, 1))
-        turn[self._yaw] = 1.0
-        spread = builder.AddNamedSystem("gaze_turn", MatrixGain(D=turn))
-        straight = builder.AddNamedSystem(
-            "gaze_straight",
-            ConstantVectorSource(-turn[:, 0] * self.start_posture[self._yaw]),
-        )
-        total = builder.AddNamedSystem("desired_state", Adder(3, 2 * n))
-        builder.Connect(
-            self.gaze.get_yaw_command_output_port(), spread.get_input_port()
-        )
-        builder.Connect(movement, total.get_input_port(0))
-        builder.Connect(spread.get_output_port(), total.get_input_port(1))
-        builder.Connect(straight.get_output_port(), total.get_input_port(2))
-        return total.get_output_port()
 
     def _add_control(
         self, builder: DiagramBuilder, desired: OutputPort
@@ -501,9 +533,3 @@ class AffettoStation(Diagram):
             self._sub(self._offset, context)
         )
         value.SetFromVector(np.asarray(offset, float))
-
-
-def _export(builder: DiagramBuilder, part: str, *ports: OutputPort) -> None:
-    """Exports output ports under their own names, as parts of the robot."""
-    for port in ports:
-        builder.ExportOutput(port, f"{part}.{port.get_name()}")

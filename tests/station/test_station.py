@@ -234,3 +234,47 @@ def test_shut_valves_hold_the_air_by_the_polytropic_law():
 def test_who_teaches_by_mouse_needs_a_browser_to_do_it_in():
     with pytest.raises(InputError, match="by_mouse"):
         AffettoStation(load_scenario("drumming"), by_mouse=True)
+
+
+@pytest.fixture(scope="module")
+def varying():
+    scenario = load_scenario("drumming")
+    scenario.variation.enabled = True
+    return AffettoStation(scenario)
+
+
+def settled(station, seed, duration=0.5):
+    """A robot that holds its posture, and its context after `duration`."""
+    context = station.CreateDefaultContext()
+    station.set_seed(context, seed)
+    Simulator(station, context).AdvanceTo(duration)
+    return context
+
+
+def test_without_variation_the_software_knows_the_joints(station):
+    context = settled(station, 1)
+    np.testing.assert_array_equal(
+        port(station, context, "affetto.estimated_state"),
+        port(station, context, "affetto.joint_state"),
+    )
+    np.testing.assert_array_equal(
+        port(station, context, "affetto.joint_state"),
+        port(station, settled(station, 2), "affetto.joint_state"),
+    )
+
+
+def test_sensors_of_a_varying_robot_are_seeded_by_the_trial(varying):
+    context = varying.CreateDefaultContext()
+    start = port(varying, context, "affetto.estimated_state")
+    np.testing.assert_array_equal(start[:8], varying.start_posture)
+    runs = [settled(varying, seed) for seed in (1, 1, 2)]
+    for name in ("affetto.estimated_state", "affetto.chamber_pressure"):
+        one, again, other = (port(varying, run, name) for run in runs)
+        np.testing.assert_array_equal(one, again)
+        assert np.abs(one - other).max() > 0.0
+    lower, upper = world.joint_limits(varying.plant, varying.joints.names)
+    error = (
+        port(varying, runs[0], "affetto.estimated_state")
+        - port(varying, runs[0], "affetto.joint_state")
+    )[:8] / (upper - lower)
+    assert 1e-5 < np.abs(error).max() < 0.01
