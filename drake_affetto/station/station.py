@@ -42,6 +42,7 @@ from drake_affetto.pneumatics.driver import (
 from drake_affetto.pneumatics.parameters import JointActuator
 from drake_affetto.scene import world
 from drake_affetto.scene.damping import set_joint_damping
+from drake_affetto.scene.joints import JointSelection
 from drake_affetto.sensing.joint_sensors import JointSensors
 from drake_affetto.skill.policy import SkillPolicy
 from drake_affetto.sound.microphone import DrumMicrophone
@@ -325,7 +326,7 @@ class AffettoStation(Diagram):
         self.sensors: JointSensors | None = None
 
         def sense(
-            joints: world.JointSelection,
+            joints: JointSelection,
             state: OutputPort,
             pressure: OutputPort,
         ) -> tuple[OutputPort, OutputPort]:
