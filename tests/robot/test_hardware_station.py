@@ -165,19 +165,14 @@ def pidf_over_the_wire(station, t, q):
     source = builder.AddSystem(TrajectorySource(path, 1))
     controller = PidfController.AddToBuilder(
         builder=builder,
-        config=config,
         joint_names=station.scenario.active_joints,
-        parameters=parameters,
+        **{name: station.GetOutputPort(f"affetto.{name}") for name in SHARED},
+        config=dataclasses.replace(config, parameters=parameters, overlays=[]),
     )
     mapping = builder.AddSystem(make_set_points(MEAN, n))
     builder.Connect(
         source.get_output_port(), controller.GetInputPort("desired_state")
     )
-    for port in SHARED:
-        builder.Connect(
-            station.GetOutputPort(f"affetto.{port}"),
-            controller.GetInputPort(port),
-        )
     builder.Connect(
         controller.GetOutputPort("pid_output"), mapping.get_input_port()
     )
