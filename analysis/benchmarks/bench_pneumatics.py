@@ -20,12 +20,12 @@ from drake_affetto.pneumatics.parameters import (
     load_parameters,
     resting_pressure,
 )
+from drake_affetto.scene.joints import select_joints
 from drake_affetto.scene.world import (
     ACTIVE_JOINTS,
     WorldConfig,
     joint_limits,
     joint_names,
-    select_joints,
 )
 from drake_affetto.station.scenario import load_scenario
 
@@ -121,7 +121,7 @@ def _simulator(names, make):
     builder = DiagramBuilder()
     plant = add_reference_plant(builder, WorldConfig())
     robot = plant.GetModelInstanceByName("affetto")
-    selection = select_joints(plant, names)
+    selection = select_joints(plant, names, robot)
     n = len(names)
     to_plant = builder.AddSystem(MatrixGain(0.0 * selection.actuation_matrix))
     builder.Connect(

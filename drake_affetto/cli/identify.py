@@ -41,6 +41,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="number of the joint in the logs; 5 is the left elbow",
     )
+    parser.add_argument(
+        "--overlay",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="YAML file that changes pneumatics.yaml before the fit, for "
+        "instance its supply pressure: "
+        "package://drake_affetto/robot_pneumatics.yaml",
+    )
     add_output_argument(parser, "out/identify")
 
 
@@ -68,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     test = [read_log(path, args.joint, controller) for path in args.test]
     _require_distinct(args.fit, "--fit")
     _require_distinct(args.test, "--test")
-    supply = load_parameters()
+    supply = load_parameters(overlays=args.overlay)
     problem = JointProblem(
         joint=joint,
         controller=controller,

@@ -33,6 +33,7 @@ COMMANDS = {
     "tune": "tune the controllers' gains on the whole robot",
     "export": "trials of a study as a table, or one trial's signals",
     "status": "show how far a study is",
+    "serve": "answer the real robot's own software in real time",
     "view": "show the robot in a browser, with sliders",
     "diagram": "draw a station's systems and their connections",
 }

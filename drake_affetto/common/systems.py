@@ -1,6 +1,6 @@
 """What systems of this package have in common: ports and their connections.
 
-The one module of this room that needs Drake to be imported.
+Importing it imports Drake, as `scalars` does and no other module of this room.
 """
 
 from collections.abc import Callable
@@ -68,6 +68,18 @@ def connect(
     """
     for name in ports:
         builder.Connect(source.GetOutputPort(name), target.GetInputPort(name))
+
+
+def export(builder: DiagramBuilder, part: str, *ports: OutputPort) -> None:
+    """Exports outputs as `part.name`, under the names that they have.
+
+    Args:
+        builder: Builder that has their systems.
+        part: Part of the robot or the scene to which they belong.
+        ports: Outputs.
+    """
+    for port in ports:
+        builder.ExportOutput(port, f"{part}.{port.get_name()}")
 
 
 class _Getter:

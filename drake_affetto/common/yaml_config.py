@@ -90,25 +90,33 @@ def typed(
 
 
 def load_config(
-    schema: type[Config], file: str | Path, overlays: Sequence[str | Path] = ()
+    schema: type[Config],
+    source: Config | str | Path,
+    overlays: Sequence[str | Path] = (),
 ) -> Config:
     """Reads a file over the defaults of `schema`, and checks the whole.
 
     Args:
         schema: a dataclass with defaults and a method `check(where)`.
-        file: the file, or its package:// URI.
-        overlays: further ones, each holding only what it changes.
+        source: the file, its package:// URI, or the values themselves.
+        overlays: further files, each holding only what it changes.
 
     Raises:
         InputError: for a file or a value that does not fit, by name.
     """
-    config = schema()
-    for item in (file, *overlays):
+    files = list(overlays)
+    if isinstance(source, schema):
+        config, where = source, schema.__name__
+    else:
+        assert isinstance(source, (str, Path))
+        config, where = schema(), resolve(source).name
+        files.insert(0, source)
+    for item in files:
         path = resolve(item)
         config = typed(
             schema, read_yaml(path), where=path.name, defaults=config
         )
-    config.check(resolve(file).name)
+    config.check(where)
     return config
 
 

@@ -5,6 +5,10 @@ from typing import TYPE_CHECKING
 from drake_affetto.common.lazy import attach
 
 if TYPE_CHECKING:
+    from drake_affetto.control.continuous_pidf import (
+        ContinuousPidfController,
+        ContinuousPidfController_,
+    )
     from drake_affetto.control.pidf import (
         ControlParameters,
         JointGains,
@@ -17,6 +21,8 @@ if TYPE_CHECKING:
 __getattr__, __dir__, __all__ = attach(
     __name__,
     {
+        "ContinuousPidfController": "continuous_pidf",
+        "ContinuousPidfController_": "continuous_pidf",
         "ControlParameters": "pidf",
         "JointGains": "pidf",
         "PidfConfig": "pidf_controller",

@@ -10,6 +10,7 @@ u_eq is an equilibrium offset: with it the joint can be held, for instance
 while somebody leads it by the hand, with small gains and without integral.
 """
 
+from collections.abc import Mapping, Sequence
 import dataclasses
 from pathlib import Path
 from typing import Self
@@ -111,7 +112,7 @@ class ControlParameters:
         integral_deadband: errors up to this are not integrated, rad. An
             integrator that works on a joint held by dry friction makes it
             jump to and fro for ever.
-        gains: gains by joint name.
+        gains: gains by joint name, or by the name of an actuator class.
     """
 
     integral_limit: float = 300e3
@@ -127,17 +128,38 @@ class ControlParameters:
         for name, gains in self.gains.items():
             gains.check(f"{where}.gains.{name}")
 
-    def for_joints(self, names: list[str]) -> PidfGains:
+    def limits(self) -> dict[str, float]:
+        """The limits, named as a controller's arguments are."""
+        return {
+            "integral_limit": self.integral_limit,
+            "difference_limit": self.difference_limit,
+            "integral_deadband": self.integral_deadband,
+        }
+
+    def for_joints(
+        self, names: Sequence[str], classes: Mapping[str, str] | None = None
+    ) -> PidfGains:
         """The gains of the joints named, in that order.
+
+        Args:
+            names: the joints.
+            classes: joint -> its actuator class, whose gains a joint has that
+                `gains` does not name.
 
         Raises:
             InputError: for a joint that has none.
         """
+        rows = []
         for name in names:
-            if name not in self.gains:
+            actuator = (classes or {}).get(name)
+            found = [k for k in (name, actuator) if k in self.gains]
+            if not found:
                 known = ", ".join(self.gains) or "none"
-                raise InputError(f"no gains for joint {name!r}; known: {known}")
-        rows = [self.gains[name] for name in names]
+                either = f" or its class {actuator!r}" if actuator else ""
+                raise InputError(
+                    f"no gains for joint {name!r}{either}; known: {known}"
+                )
+            rows.append(self.gains[found[0]])
         return PidfGains(
             kP=np.array([g.kP for g in rows]),
             kI=np.array([g.kI for g in rows]),
@@ -147,12 +169,13 @@ class ControlParameters:
 
 
 def load_control(
-    file: str | Path = DEFAULT_FILE, overlays: tuple[str | Path, ...] = ()
+    source: ControlParameters | str | Path = DEFAULT_FILE,
+    overlays: Sequence[str | Path] = (),
 ) -> ControlParameters:
     """Reads gains and limits from a YAML file of `ControlParameters`.
 
     Args:
-        file: the file, or its package:// URI.
+        source: the file, its package:// URI, or the parameters themselves.
         overlays: further ones, each holding only what it changes.
 
     Raises:
@@ -161,7 +184,7 @@ def load_control(
     # Drake's YAML reader is behind this; the mathematics need none of it.
     from drake_affetto.common.yaml_config import load_config
 
-    return load_config(ControlParameters, file, overlays)
+    return load_config(ControlParameters, source, overlays)
 
 
 @numba.njit(cache=True)

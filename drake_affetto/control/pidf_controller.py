@@ -1,6 +1,6 @@
 """The PIDF controller as a system."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import dataclasses
 
 import numpy as np
@@ -11,6 +11,7 @@ from pydrake.systems.framework import (
     DiagramBuilder,
     DiscreteValues,
     LeafSystem,
+    OutputPort,
 )
 
 from drake_affetto.common.errors import require, require_range
@@ -29,14 +30,14 @@ class PidfConfig:
     """How the joint controllers of a scenario are made.
 
     Attributes:
-        parameters: YAML file of `ControlParameters`.
+        parameters: `ControlParameters`, or a YAML file of them.
         overlays: YAML files that change some of them.
         period: Period of the updates, s.
         gravity_share: Share of gravity that the demand compensates beforehand,
             from the robot's model of itself; 0: none.
     """
 
-    parameters: str = DEFAULT_FILE
+    parameters: str | ControlParameters = DEFAULT_FILE
     overlays: list[str] = dataclasses.field(default_factory=list)
     period: float = 0.005
     gravity_share: float = 0.0
@@ -134,34 +135,42 @@ class PidfController(LeafSystem):
     def AddToBuilder(
         *,
         builder: DiagramBuilder,
-        config: PidfConfig,
         joint_names: Sequence[str],
-        parameters: ControlParameters | None = None,
+        estimated_state: OutputPort,
+        chamber_pressure: OutputPort,
+        config: PidfConfig | None = None,
+        actuator_classes: Mapping[str, str] | None = None,
         name: str = "pidf_controller",
     ) -> "PidfController":
         """Adds the controller of the named joints to `builder`.
 
+        The inputs `desired_state` and `equilibrium_offset` are left to be
+        connected.
+
         Args:
             builder: Builder of the Diagram.
-            config: Period, and the files of parameters.
             joint_names: Names of the joints, in the order of the ports.
-            parameters: Parameters themselves, instead of the files.
+            estimated_state: [q; q̇] (2n), rad and rad/s.
+            chamber_pressure: [p_a; p_b] (2n), Pa.
+            config: Period and parameters.
+            actuator_classes: Joint -> its actuator class, whose gains a joint
+                has that the parameters do not name.
             name: Name of the system.
 
         Raises:
             InputError: If the configuration does not fit.
         """
+        config = config or PidfConfig()
         config.check(name)
-        if parameters is None:
-            parameters = load_control(config.parameters, tuple(config.overlays))
+        parameters = load_control(config.parameters, config.overlays)
         system = PidfController(
-            parameters.for_joints(list(joint_names)),
+            parameters.for_joints(joint_names, actuator_classes),
             period=config.period,
-            integral_limit=parameters.integral_limit,
-            difference_limit=parameters.difference_limit,
-            integral_deadband=parameters.integral_deadband,
+            **parameters.limits(),
         )
-        return builder.AddNamedSystem(name, system)
+        builder.AddNamedSystem(name, system)
+        connect_feedback(builder, system, estimated_state, chamber_pressure)
+        return system
 
     get_desired_state_input_port = input_port(
         "[q_des; q̇_des] (2n), rad and rad/s."
@@ -246,3 +255,16 @@ class PidfController(LeafSystem):
             mutable(self._demand_index),
             mutable(self._opening_index),
         )
+
+
+def connect_feedback(
+    builder: DiagramBuilder,
+    controller: LeafSystem,
+    estimated_state: OutputPort,
+    chamber_pressure: OutputPort,
+) -> None:
+    """Connects what a controller measures, whatever its time."""
+    builder.Connect(estimated_state, controller.GetInputPort("estimated_state"))
+    builder.Connect(
+        chamber_pressure, controller.GetInputPort("chamber_pressure")
+    )

@@ -314,7 +314,8 @@ class JointSimulator:
             values: Values of the fitted parameters by name.
             log: Log with the initial state, the reference and, in open loop,
                 the commands.
-            closed_loop: Whether the robot's PID law makes the commands.
+            closed_loop: Whether the robot's PID law makes the commands; a log
+                without a reference has its own instead.
             start_delay: Dead time of the start, see `estimate_start_delay`, s.
             until: Time at which the simulation ends, s.
             time_step: Step of the simulation, s.
@@ -347,6 +348,7 @@ class JointSimulator:
             ]
         )
         rows = int(np.searchsorted(log.t, until, side="right"))
+        closed_loop = closed_loop and log.has_reference
         setting = _Setting(law, delays, closed_loop, release=0.0, dwell=1.0)
         return self._simulate(values, log, slice(0, rows), setting)
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         GazePhase,
         GazeTask,
     )
-    from drake_affetto.perception.gaze_servo import GazeServo
+    from drake_affetto.perception.gaze_servo import GazeServo, gaze_view
     from drake_affetto.perception.imaging import ImageEffects
     from drake_affetto.perception.mirror_camera import (
         MirrorCamera,
@@ -62,5 +62,6 @@ __getattr__, __dir__, __all__ = attach(
         "RenderConfig": "config",
         "add_renderers": "mirror_camera",
         "detect": "blob",
+        "gaze_view": "gaze_servo",
     },
 )

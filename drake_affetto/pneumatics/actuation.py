@@ -1,41 +1,52 @@
 """The actuators as a system: valve commands in, joint torques out."""
 
-from collections.abc import Sequence
 import dataclasses
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import (
     BasicVector,
     Context,
     DiagramBuilder,
     DiscreteValues,
     LeafSystem,
+    OutputPort,
 )
+from pydrake.systems.primitives import MatrixGain
 
-from drake_affetto.common.errors import require, require_array, require_range
+from drake_affetto.common.errors import (
+    InputError,
+    require,
+    require_array,
+    require_range,
+)
 from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.pneumatics.chamber import (
     FLOW_MODE,
     REGULATOR_MODE,
-    ROWS,
-    Row,
     line_slots,
     memory_size,
     step_joints,
 )
+from drake_affetto.pneumatics.equilibrium import chamber_torque
 from drake_affetto.pneumatics.parameters import (
     DEFAULT_FILE,
+    Joints,
     PneumaticParameters,
     largest_dead_time,
     load_parameters,
+    parameter_array,
     resting_pressure,
 )
 from drake_affetto.pneumatics.variation import (
     ActuatorVariation,
     supply_change,
 )
+from drake_affetto.scene.joints import JointSelection
+
+Actuation = TypeVar("Actuation", bound=LeafSystem)
 
 _MODES = {"flow": FLOW_MODE, "regulator": REGULATOR_MODE}
 
@@ -47,18 +58,16 @@ class PneumaticActuationConfig:
     Attributes:
         mode: "flow" (the command is the valves' opening) or "regulator" (it
             is a pressure set-point for each chamber).
-        parameters: YAML file of `PneumaticParameters`.
+        parameters: `PneumaticParameters`, or a YAML file of them.
         overlays: YAML files that change some of them, for instance a fit.
-        time_step: Update period, s; the plant's.
         look_ahead: Steps by which the joint state that the update reads lags
             behind the one the torque will act on. 0 for a MultibodyPlant of
             this step, with or without sampled output ports.
     """
 
     mode: str = "flow"
-    parameters: str = DEFAULT_FILE
+    parameters: str | PneumaticParameters = DEFAULT_FILE
     overlays: list[str] = dataclasses.field(default_factory=list)
-    time_step: float = 0.001
     look_ahead: float = 0.0
 
     def check(self, where: str) -> None:
@@ -69,7 +78,6 @@ class PneumaticActuationConfig:
             self.mode,
             "'flow' or 'regulator'",
         )
-        require_range(f"{where}.time_step", self.time_step, 1e-6, 0.01)
         require_range(f"{where}.look_ahead", self.look_ahead, 0.0, 2.0)
 
 
@@ -111,7 +119,8 @@ class PneumaticActuation(LeafSystem):
 
     def __init__(
         self,
-        parameters: NDArray[np.float64],
+        parameters: PneumaticParameters | NDArray[np.float64],
+        joints: Joints | None = None,
         *,
         mode: str = "flow",
         time_step: float = 0.001,
@@ -121,7 +130,9 @@ class PneumaticActuation(LeafSystem):
         """Declares ports, state and the periodic update.
 
         Args:
-            parameters: (ROWS, n) array, from `PneumaticParameters.for_joints`.
+            parameters: of the actuators of `joints`; or the (ROWS, n) array
+                of `parameters.parameter_array`.
+            joints: the n joints with their limits, from `select_joints`.
             mode: "flow" or "regulator".
             time_step: update period, s; the plant's.
             look_ahead: see `PneumaticActuationConfig`.
@@ -132,17 +143,10 @@ class PneumaticActuation(LeafSystem):
             InputError: for arguments that do not fit.
         """
         super().__init__()
-        config = PneumaticActuationConfig(
-            mode=mode, time_step=time_step, look_ahead=look_ahead
-        )
+        config = PneumaticActuationConfig(mode=mode, look_ahead=look_ahead)
         config.check("PneumaticActuation")
-        array = np.array(parameters, dtype=float)
-        require(
-            array.ndim == 2 and array.shape[0] == ROWS and array.shape[1] > 0,
-            "parameters",
-            array.shape,
-            f"an array of shape ({ROWS}, n)",
-        )
+        require_range("time_step", time_step, 1e-6, 0.01)
+        array = parameter_array(parameters, joints)
         self.parameters = array.copy()
         self._n = array.shape[1]
         self._shape = array.shape
@@ -175,7 +179,7 @@ class PneumaticActuation(LeafSystem):
         pressure = np.concatenate([rest, rest])
         self._pressure_index = self.DeclareDiscreteState(pressure)
         self._torque_index = self.DeclareDiscreteState(
-            _chamber_torque(array, pressure)
+            chamber_torque(array, pressure)
         )
         self._flow_index = self.DeclareDiscreteState(2 * n)
         self._memory_index = self.DeclareDiscreteState(
@@ -194,41 +198,45 @@ class PneumaticActuation(LeafSystem):
     def AddToBuilder(
         *,
         builder: DiagramBuilder,
-        config: PneumaticActuationConfig,
-        joint_names: Sequence[str],
-        q_lower: ArrayLike,
-        q_upper: ArrayLike,
-        parameters: PneumaticParameters | None = None,
+        plant: MultibodyPlant,
+        joints: JointSelection,
+        estimated_state: OutputPort,
+        config: PneumaticActuationConfig | None = None,
         longest_delay: float = 0.0,
         name: str = "pneumatic_actuation",
     ) -> "PneumaticActuation":
-        """Adds the actuators of the named joints to `builder`.
+        """Adds the actuators of `joints`, whose torques drive `plant`.
+
+        The input of the command is left to be connected.
 
         Args:
             builder: Builder of the Diagram.
-            config: Mode, step and the files of parameters.
-            joint_names: Names of the joints, in the order of the ports.
-            q_lower: Lower limits of the joints (n,), rad.
-            q_upper: Upper limits of the joints (n,), rad.
-            parameters: Parameters themselves, instead of the files.
+            plant: Plant in `builder`, discrete; its step is the actuators'.
+            joints: From `select_joints`.
+            estimated_state: [q; q̇] (2n) of the joints, rad and rad/s.
+            config: Mode and parameters.
             longest_delay: The most that a trial adds to a dead time, s.
             name: Name of the system.
 
         Raises:
-            InputError: If the configuration does not fit.
+            InputError: If the configuration does not fit, or the joints are
+                driven already.
         """
+        config = config or PneumaticActuationConfig()
         config.check(name)
-        if parameters is None:
-            parameters = load_parameters(config.parameters, config.overlays)
-        array = parameters.for_joints(joint_names, q_lower, q_upper)
+        array = parameter_array(
+            load_parameters(config.parameters, config.overlays), joints
+        )
         system = PneumaticActuation(
             array,
             mode=config.mode,
-            time_step=config.time_step,
+            time_step=plant.time_step(),
             look_ahead=config.look_ahead,
             max_dead_time=largest_dead_time(array) + longest_delay,
         )
-        return builder.AddNamedSystem(name, system)
+        return add_actuation(
+            builder, plant, joints, estimated_state, system, name
+        )
 
     get_command_input_port = input_port(
         "`valve_opening` or `pressure_command`, whichever the mode has.",
@@ -342,7 +350,7 @@ class PneumaticActuation(LeafSystem):
             if given.shape in ((), (1,)):
                 given = np.full(n, given)
             part[:] = require_array(name, given, (n,), positive=True)
-        torque = _chamber_torque(self.get_parameters(context), pressure)
+        torque = chamber_torque(self.get_parameters(context), pressure)
         context.SetDiscreteState(self._pressure_index, pressure)
         context.SetDiscreteState(self._torque_index, torque)
         context.SetDiscreteState(self._flow_index, np.zeros(2 * n))
@@ -353,34 +361,6 @@ class PneumaticActuation(LeafSystem):
         """Resets the whole state at the pressures of the valves' rest."""
         rest = resting_pressure(self.get_parameters(context))
         self.set_pressures(context, rest, rest)
-
-    def pressures_for_torque(
-        self, context: Context, torque: ArrayLike, mean: ArrayLike | None = None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Chamber pressures that give `torque` at about a mean pressure.
-
-        Args:
-            context: this system's context.
-            torque: (n) N m, for instance what holds the arm against gravity.
-            mean: mean pressure, Pa absolute, scalar or (n); by default the
-                pressure of the valves' rest.
-
-        Returns:
-            p_a and p_b (n each), Pa absolute, within atmosphere and supply.
-        """
-        array = self.get_parameters(context)
-        if mean is None:
-            mean = resting_pressure(array)
-        wanted = np.asarray(torque, dtype=float)
-        K_a, K_b = array[Row.K_A], array[Row.K_B]
-        low, high = array[Row.ATMOSPHERE], array[Row.SUPPLY]
-        gauge = np.asarray(mean, dtype=float) - low
-        shift = (wanted - (K_a - K_b) * gauge) / (K_a + K_b)
-        # Where one chamber meets a limit the other makes up for it.
-        p_a = np.clip(mean + shift, low, high)
-        p_b = np.clip(low + (K_a * (p_a - low) - wanted) / K_b, low, high)
-        p_a = np.clip(low + (K_b * (p_b - low) + wanted) / K_a, low, high)
-        return p_a, p_b
 
     def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
         mutable = discrete_state.get_mutable_value
@@ -403,11 +383,40 @@ class PneumaticActuation(LeafSystem):
         )
 
 
-def _chamber_torque(
-    parameters: NDArray[np.float64], pressure: NDArray[np.float64]
-) -> Any:
-    """Torque of both chambers (n), N m, without friction."""
-    n = parameters.shape[1]
-    gauge_a = pressure[:n] - parameters[Row.ATMOSPHERE]
-    gauge_b = pressure[n:] - parameters[Row.ATMOSPHERE]
-    return parameters[Row.K_A] * gauge_a - parameters[Row.K_B] * gauge_b
+def add_actuation(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    joints: JointSelection,
+    estimated_state: OutputPort,
+    system: Actuation,
+    name: str,
+) -> Actuation:
+    """Adds actuators to `builder`, wired to the plant that they drive.
+
+    Args:
+        builder: Builder of the Diagram.
+        plant: Plant in `builder`.
+        joints: The n joints, of one model.
+        estimated_state: [q; q̇] (2n) of the joints.
+        system: Actuators of the joints.
+        name: Name of the system; `{name}_spread` puts the torques in the
+            plant's order.
+
+    Raises:
+        InputError: If the joints are driven already.
+    """
+    driven = plant.get_actuation_input_port(joints.model_instance)
+    model = plant.GetModelInstanceName(joints.model_instance)
+    if builder.IsConnectedOrExported(driven):
+        raise InputError(
+            f"joints {', '.join(joints.names)} of model {model} have a driver "
+            "already, expected one driver a model"
+        )
+    builder.AddNamedSystem(name, system)
+    spread = builder.AddNamedSystem(
+        f"{name}_spread", MatrixGain(D=joints.actuation_matrix)
+    )
+    builder.Connect(estimated_state, system.get_estimated_state_input_port())
+    builder.Connect(system.get_actuation_output_port(), spread.get_input_port())
+    builder.Connect(spread.get_output_port(), driven)
+    return system

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 import dataclasses
 import math
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from drake_affetto.common.errors import (
     InputError,
     require,
-    require_array,
     require_range,
 )
 from drake_affetto.common.fields import check_ranges, number
@@ -199,14 +199,20 @@ class PneumaticParameters:
             InputError: for an unknown joint or limits that do not fit.
         """
         n = len(names)
-        low = require_array("q_lower", q_lower, (n,))
-        high = require_array("q_upper", q_upper, (n,))
-        for i in range(n):
+        low, high = np.asarray(q_lower, float), np.asarray(q_upper, float)
+        require(
+            low.shape == high.shape == (n,),
+            "shapes of q_lower and q_upper",
+            (low.shape, high.shape),
+            f"({n},), a limit for each joint",
+        )
+        for name, least, greatest in zip(names, low, high, strict=True):
             require(
-                low[i] < high[i],
-                f"q_lower[{i}]",
-                float(low[i]),
-                f"a number below q_upper[{i}], which is {high[i]:g}",
+                -np.inf < least < greatest < np.inf,
+                f"range of joint {name}",
+                [float(least), float(greatest)],
+                "a finite lower and a greater upper limit: the volumes of "
+                "the chambers follow from them",
             )
         array = np.empty((ROWS, n))
         for i, name in enumerate(names):
@@ -250,12 +256,14 @@ class PneumaticParameters:
 
 
 def load_parameters(
-    file: str | Path = DEFAULT_FILE, overlays: Sequence[str | Path] = ()
+    source: PneumaticParameters | str | Path = DEFAULT_FILE,
+    overlays: Sequence[str | Path] = (),
 ) -> PneumaticParameters:
     """Reads the actuators' parameters.
 
     Args:
-        file: a YAML file of `PneumaticParameters`, or its package:// URI.
+        source: a YAML file of `PneumaticParameters`, its package:// URI, or
+            the parameters themselves.
         overlays: further such files, each holding only what it changes (for
             instance a fit to a robot's logs).
 
@@ -265,10 +273,50 @@ def load_parameters(
     # Drake's YAML reader is behind this; the mathematics need none of it.
     from drake_affetto.common.yaml_config import load_config
 
-    return load_config(PneumaticParameters, file, overlays)
+    return load_config(PneumaticParameters, source, overlays)
 
 
-def resting_pressure(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+class Joints(Protocol):
+    """Joints by their names, with their limits, for instance a selection of a
+    plant's (`scene.JointSelection`)."""
+
+    @property
+    def names(self) -> Sequence[str]: ...
+    @property
+    def lower(self) -> NDArray[np.float64]: ...
+    @property
+    def upper(self) -> NDArray[np.float64]: ...
+
+
+def parameter_array(
+    parameters: PneumaticParameters | ArrayLike, joints: Joints | None = None
+) -> NDArray[np.float64]:
+    """The (ROWS, n) array of the kernel, see `chamber.Row`.
+
+    Args:
+        parameters: of the actuators of `joints`; or the array itself.
+        joints: whose limits the chambers have; not needed for an array.
+
+    Raises:
+        InputError: if they do not fit.
+    """
+    if isinstance(parameters, PneumaticParameters):
+        if joints is None:
+            raise InputError("joints is None, expected those of the parameters")
+        return parameters.for_joints(joints.names, joints.lower, joints.upper)
+    array = np.array(parameters, dtype=float)
+    require(
+        array.ndim == 2 and array.shape[0] == ROWS and array.shape[1] > 0,
+        "parameters",
+        array.shape,
+        f"an array of shape ({ROWS}, n)",
+    )
+    return array
+
+
+def resting_pressure(
+    parameters: NDArray[np.float64], opening: ArrayLike = 0.0
+) -> NDArray[np.float64]:
     """The pressure at which a chamber stays with its valve at rest.
 
     It is the one at which the underlapped edges and the leak pass as much air
@@ -276,19 +324,22 @@ def resting_pressure(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
 
     Args:
         parameters: (ROWS, n), see `chamber.Row`.
+        opening: where the valve is held instead, (n) or for all, in [-1, 1].
 
     Returns:
         (n) Pa absolute. With the valve closed at rest and no leak any pressure
         stays: half of the supply's gauge pressure is returned then.
     """
     result = np.empty(parameters.shape[1])
+    strokes = np.broadcast_to(np.asarray(opening, dtype=float), result.shape)
     for i, column in enumerate(parameters.T):
         supply = column[Row.SUPPLY]
         atmosphere = column[Row.ATMOSPHERE]
         temperature = column[Row.TEMPERATURE]
-        fraction = opening_fraction(0.0, column[Row.UNDERLAP])
-        fill = column[Row.C_FILL] * fraction
-        out = column[Row.C_EXHAUST] * fraction + column[Row.C_LEAK]
+        under = column[Row.UNDERLAP]
+        fill = column[Row.C_FILL] * opening_fraction(strokes[i], under)
+        vent = opening_fraction(-strokes[i], under)
+        out = column[Row.C_EXHAUST] * vent + column[Row.C_LEAK]
         low, high = atmosphere, supply
         if fill == 0.0 and out == 0.0:
             result[i] = 0.5 * (low + high)

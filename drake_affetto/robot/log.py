@@ -46,7 +46,8 @@ class RobotLog(JointCourse):
     Attributes:
         name: Name of the file, without its suffix.
         joint: Number of the joint in the log.
-        q_des: Reference angle, %.
+        q_des: Reference angle, %; not a number in a log that was made at the
+            wire, where the reference is never seen.
         dq_des: Reference velocity, %/s.
         q_filtered: Angle that the robot's controller used, %.
         dq_filtered: Velocity that the robot's controller used, %/s.
@@ -59,6 +60,11 @@ class RobotLog(JointCourse):
     q_filtered: Array
     dq_filtered: Array
 
+    @property
+    def has_reference(self) -> bool:
+        """Whether the log says which angles were wanted."""
+        return bool(np.all(np.isfinite(self.q_des)))
+
 
 def read_log(
     path: str | Path,
@@ -69,8 +75,8 @@ def read_log(
 ) -> RobotLog:
     """Reads one joint from a CSV log of the robot.
 
-    Required columns (k is the joint): t, rqk, rpak, rpbk, cak, cbk, qdesk.
-    Optional columns: dqdesk, qk, dqk.
+    Required columns (k is the joint): t, rqk, rpak, rpbk, cak, cbk.
+    Optional columns: qdesk, dqdesk, qk, dqk.
 
     Args:
         path: The CSV file.
@@ -87,9 +93,8 @@ def read_log(
         [
             "t",
             *(f"{name}{joint}" for name in ("rq", "rpa", "rpb", "ca", "cb")),
-            f"qdes{joint}",
         ],
-        [f"dqdes{joint}", f"q{joint}", f"dq{joint}"],
+        [f"{name}{joint}" for name in ("qdes", "dqdes", "q", "dq")],
     )
     for name, column in data.items():
         bad = np.flatnonzero(~np.isfinite(column))
@@ -112,7 +117,7 @@ def read_log(
         )
     scale = controller.command_maximum / COMMAND_MAXIMUM
     q = data[f"rq{joint}"]
-    q_des = data[f"qdes{joint}"]
+    q_des = data.get(f"qdes{joint}", np.full(t.size, np.nan))
     log = RobotLog(
         name=path.stem,
         joint=joint,

@@ -8,7 +8,6 @@ context, i.e. `plant.GetMyContextFromRoot(root_context)`.
 from collections.abc import Iterator, Mapping, Sequence
 import contextlib
 import dataclasses
-import difflib
 from typing import Any
 
 import numpy as np
@@ -31,6 +30,7 @@ from pydrake.multibody.parsing import (
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
+    ModelInstanceIndex,
     RevoluteJoint,
     RigidBody,
     WeldJoint,
@@ -45,6 +45,7 @@ from drake_affetto.common.errors import (
 )
 from drake_affetto.common.resources import configure_parser, resolve
 from drake_affetto.geometry.kinematics import SerialChain
+from drake_affetto.scene import joints
 
 ACTIVE_JOINTS = (
     "waist_roll",
@@ -213,39 +214,33 @@ def _require_scene(plant: MultibodyPlant, uri: str) -> None:
             raise InputError(f"{uri} has no {name}")
 
 
+def robot_instance(plant: MultibodyPlant) -> ModelInstanceIndex:
+    """The robot's model instance."""
+    return plant.GetModelInstanceByName("affetto")
+
+
 def get_joint(plant: MultibodyPlant, name: str) -> RevoluteJoint:
     """The robot's joint `name`.
 
     Raises:
         InputError: if there is none; the message offers the nearest name.
     """
-    robot = plant.GetModelInstanceByName("affetto")
-    if not plant.HasJointNamed(name, robot):
-        known = joint_names(plant)
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        raise InputError(f"the robot has no joint {name!r}{hint}")
-    return plant.GetJointByName(name, robot)
+    return joints.find_joint(plant, robot_instance(plant), name)
 
 
 def joint_names(plant: MultibodyPlant) -> list[str]:
     """The names of the robot's actuated joints, in the model's order."""
-    robot = plant.GetModelInstanceByName("affetto")
-    return [
-        plant.get_joint(i).name()
-        for i in plant.GetJointIndices(robot)
-        if plant.get_joint(i).num_positions() == 1
-    ]
+    return joints.joint_names(plant, robot_instance(plant))
 
 
 def joint_limits(
     plant: MultibodyPlant, names: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Lower and upper limits [rad] of the joints `names`, each (n,)."""
-    joints = [get_joint(plant, name) for name in names]
+    found = [get_joint(plant, name) for name in names]
     return (
-        np.array([joint.position_lower_limit() for joint in joints]),
-        np.array([joint.position_upper_limit() for joint in joints]),
+        np.array([joint.position_lower_limit() for joint in found]),
+        np.array([joint.position_upper_limit() for joint in found]),
     )
 
 
@@ -329,81 +324,6 @@ def weld_inactive(plant: MultibodyPlant, active: Sequence[str]) -> None:
         plant.RemoveJointActuator(plant.get_joint_actuator(actuators[name]))
         plant.RemoveJoint(joint)
         plant.AddJoint(weld)
-
-
-@dataclasses.dataclass(frozen=True)
-class JointSelection:
-    """Where the active joints stand in the robot's state and actuation.
-
-    Attributes:
-        names: the active joints, in the order of every n-vector.
-        positions: (n,) indices into the robot's q (model instance).
-        velocities: (n,) indices into the robot's v (model instance).
-        actuators: (n,) indices into the robot's actuation input.
-        state_matrix: (2n, nq+nv), [q; q̇] of the active joints from the
-            robot's state.
-        actuation_matrix: (nu, n), the robot's actuation from the active
-            joints' torques.
-    """
-
-    names: tuple[str, ...]
-    positions: np.ndarray
-    velocities: np.ndarray
-    actuators: np.ndarray
-    state_matrix: np.ndarray
-    actuation_matrix: np.ndarray
-
-
-def select_joints(
-    plant: MultibodyPlant, names: Sequence[str]
-) -> JointSelection:
-    """Selects the joints `names` of the finalized `plant`.
-
-    Raises:
-        InputError: for an unknown joint or one named twice.
-    """
-    require(
-        len(names) > 0 and len(set(names)) == len(names),
-        "active joints",
-        list(names),
-        "at least one joint, none of them twice",
-    )
-    robot = plant.GetModelInstanceByName("affetto")
-    joints = [get_joint(plant, name) for name in names]
-    # The instance's own order, found by asking for the numbers 0, 1, 2, ...
-    q_order = plant.GetPositionsFromArray(
-        robot, np.arange(plant.num_positions(), dtype=float)
-    ).astype(int)
-    v_order = plant.GetVelocitiesFromArray(
-        robot, np.arange(plant.num_velocities(), dtype=float)
-    ).astype(int)
-    positions = np.array(
-        [int(np.flatnonzero(q_order == j.position_start())[0]) for j in joints]
-    )
-    velocities = np.array(
-        [int(np.flatnonzero(v_order == j.velocity_start())[0]) for j in joints]
-    )
-    order = [int(i) for i in plant.GetJointActuatorIndices(robot)]
-    actuators = np.array(
-        [
-            order.index(int(plant.GetJointActuatorByName(name, robot).index()))
-            for name in names
-        ]
-    )
-    n, nq, nv = len(names), len(q_order), len(v_order)
-    state_matrix = np.zeros((2 * n, nq + nv))
-    state_matrix[np.arange(n), positions] = 1.0
-    state_matrix[n + np.arange(n), nq + velocities] = 1.0
-    actuation_matrix = np.zeros((len(order), n))
-    actuation_matrix[actuators, np.arange(n)] = 1.0
-    return JointSelection(
-        names=tuple(names),
-        positions=positions,
-        velocities=velocities,
-        actuators=actuators,
-        state_matrix=state_matrix,
-        actuation_matrix=actuation_matrix,
-    )
 
 
 def _inspector(plant: MultibodyPlant, context: Context) -> SceneGraphInspector:

@@ -203,6 +203,8 @@ class Scenario:
             active joints the start posture, of others where they are welded.
         active_joints: the joints that move, in the order of every vector; the
             others are welded.
+        joint_damping: viscous friction of joints where it is not the model's,
+            N m s/rad.
         yaw_joint: the active joint by which the gaze turns (q3).
         drum_region: where trials put the drum.
         camera, mirrors, rendering, blob, gaze: see `perception`.
@@ -221,6 +223,10 @@ class Scenario:
         valve_source: "pidf": the valves are controlled (Eq. 7). "external":
             `affetto.valve_opening` is an input of the station (or
             `affetto.pressure_command` with pressure regulators).
+        wire: YAML file of the robot's wire (see `robot.wire`); only where a
+            robot is spoken to, or is simulated behind its wire.
+        hardware: whether the station drives a robot over that wire, instead of
+            simulating one (see `robot.hardware_station`).
     """
 
     random_seed: int = 0
@@ -241,6 +247,7 @@ class Scenario:
     active_joints: list[str] = dataclasses.field(
         default_factory=lambda: list(ACTIVE_JOINTS)
     )
+    joint_damping: dict[str, float] = dataclasses.field(default_factory=dict)
     yaw_joint: str = "waist_yaw"
     drum_region: DrumRegion = dataclasses.field(default_factory=DrumRegion)
     camera: CameraConfig = dataclasses.field(default_factory=CameraConfig)
@@ -268,6 +275,8 @@ class Scenario:
     teaching: TeacherConfig = dataclasses.field(default_factory=TeacherConfig)
     motion_source: str = "skill"
     valve_source: str = "pidf"
+    wire: str = ""
+    hardware: bool = False
 
     def check(self, where: str = "scenario") -> None:
         """Checks everything that can be checked without building anything.

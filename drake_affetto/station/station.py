@@ -23,15 +23,13 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 from pydrake.systems.primitives import (
-    MatrixGain,
     PassThrough,
 )
 from pydrake.systems.sensors import CameraInfo
 
 from drake_affetto.common.errors import require
-from drake_affetto.common.systems import connect
+from drake_affetto.common.systems import connect, export
 from drake_affetto.control.gravity_feedforward import GravityFeedforward
-from drake_affetto.control.pidf_controller import PidfController
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.motion.dmp_source import DmpSource
 from drake_affetto.perception.analytic_blob_sensor import AnalyticBlobSensor
@@ -39,14 +37,22 @@ from drake_affetto.perception.blob_sensor import BlobSensor
 from drake_affetto.perception.gaze import GazeMode, GazeTask
 from drake_affetto.perception.gaze_servo import GazeServo, gaze_view
 from drake_affetto.perception.mirror_camera import MirrorCamera
-from drake_affetto.pneumatics.actuation import PneumaticActuation
-from drake_affetto.pneumatics.parameters import pressure_differences
+from drake_affetto.pneumatics.driver import (
+    AddPneumaticDriver,
+    PneumaticDriver,
+    PneumaticSystems,
+)
+from drake_affetto.pneumatics.parameters import (
+    JointActuator,
+    pressure_differences,
+)
 from drake_affetto.scene import world
+from drake_affetto.scene.damping import set_joint_damping
+from drake_affetto.scene.joints import JointSelection
 from drake_affetto.sensing.joint_sensors import JointSensors
 from drake_affetto.skill.policy import SkillPolicy
 from drake_affetto.sound.microphone import DrumMicrophone
 from drake_affetto.station.gaze_turn import add_gaze_turn
-from drake_affetto.station.joint_state import make_joint_state
 from drake_affetto.station.scenario import Scenario
 from drake_affetto.teaching.kinesthetic_teacher import KinestheticTeacher
 from drake_affetto.teaching.mouse_teacher import MouseTeacher
@@ -157,20 +163,25 @@ class AffettoStation(Diagram):
         )
         world.add_world(self.plant, scenario.world)
         world.weld_inactive(self.plant, scenario.active_joints)
+        set_joint_damping(self.plant, scenario.joint_damping)
         self.plant.Finalize()
-        self.joints = world.select_joints(self.plant, scenario.active_joints)
         self._yaw = scenario.active_joints.index(scenario.yaw_joint)
-        self._robot = self.plant.GetModelInstanceByName("affetto")
+        self._robot = world.robot_instance(self.plant)
+        self.pneumatics = self._add_pneumatics(builder)
+        self.joints = self.pneumatics.joints
+        self.actuation = self.pneumatics.actuation
+        self.controller = self.pneumatics.controller
+        self._joint_state = self.pneumatics.joint_state
+        self._true_state = self._joint_state.get_output_port()
+        builder.ExportOutput(self._true_state, "affetto.joint_state")
+        self._estimated_state = self.pneumatics.estimated_state
         self.start_posture = np.array(
             [
                 world.get_joint(self.plant, name).get_default_angle()
                 for name in self.joints.names
             ]
         )
-        self._true_state = self._add_joint_state(builder)
         self._add_teacher(builder, meshcat if by_mouse else None)
-        self._add_actuation(builder)
-        self.sensors = self._add_sensors(builder)
         self._add_sight(builder)
         self._add_hearing(builder)
         desired = self._add_motion(builder)
@@ -220,7 +231,14 @@ class AffettoStation(Diagram):
         """
         mine = self._mine(context)
         self.SetDefaultContext(mine)
-        self._balance_gravity(context)
+        held = self.pneumatics.hold_posture(self, mine)
+        if self.controller is not None:
+            known = self._gravity.reset(
+                self._sub(self._gravity, context), self.start_posture
+            )
+            self.controller.set_integral(
+                self._sub(self.controller, context), held - known
+            )
         self.set_seed(context, self.scenario.random_seed)
         self._reset_sensors(context)
         if self.scenario.motion_source == "skill":
@@ -237,25 +255,6 @@ class AffettoStation(Diagram):
             self.dmp_source.set_start_posture(
                 self._sub(self.dmp_source, context), self.start_posture
             )
-
-    def _balance_gravity(self, context: Context) -> None:
-        """Pressures about their resting value that hold the posture."""
-        plant_context = self._sub(self.plant, context)
-        gravity = self.plant.GetVelocitiesFromArray(
-            self._robot,
-            self.plant.CalcGravityGeneralizedForces(plant_context),
-        )
-        torque = -gravity[self.joints.velocities]
-        actuation = self._sub(self.actuation, context)
-        p_a, p_b = self.actuation.pressures_for_torque(actuation, torque)
-        self.actuation.set_pressures(actuation, p_a, p_b)
-        if self.scenario.valve_source == "pidf":
-            controller = self._sub(self.controller, context)
-            self.controller.reset(controller, p_a - p_b)
-            known = self._gravity.reset(
-                self._sub(self._gravity, context), self.start_posture
-            )
-            self.controller.set_integral(controller, p_a - p_b - known)
 
     def set_drum_position(self, context: Context, xy: ArrayLike) -> None:
         """Puts the drum at xy (2,), m, on the table in the world frame.
@@ -340,42 +339,48 @@ class AffettoStation(Diagram):
         """The system's context, from the station's or from the root's."""
         return self.GetMutableSubsystemContext(system, self._mine(context))
 
-    def _add_joint_state(self, builder: DiagramBuilder) -> OutputPort:
-        self._joint_state = builder.AddNamedSystem(
-            "joint_state",
-            make_joint_state(self.joints, self.scenario.plant_config.time_step),
-        )
-        builder.Connect(
-            self.plant.get_state_output_port(self._robot),
-            self._joint_state.get_input_port(),
-        )
-        state = self._joint_state.get_output_port()
-        builder.ExportOutput(state, "affetto.joint_state")
-        return state
+    def _add_pneumatics(self, builder: DiagramBuilder) -> PneumaticSystems:
+        scenario = self.scenario
+        controlled = scenario.valve_source == "pidf"
+        self.sensors: JointSensors | None = None
 
-    def _add_sensors(self, builder: DiagramBuilder) -> JointSensors | None:
-        """Adds the sensors of a robot that varies."""
-        self._estimated_state = self._true_state
-        self._pressure = self.actuation.get_chamber_pressure_output_port()
-        sensors = None
-        if self.scenario.variation.enabled:
-            sensors = JointSensors.AddToBuilder(
+        def sense(
+            joints: JointSelection,
+            state: OutputPort,
+            pressure: OutputPort,
+        ) -> tuple[OutputPort, OutputPort]:
+            """Adds the sensors; returns [q; q̇] and [p_a; p_b] as read."""
+            self.sensors = JointSensors.AddToBuilder(
                 builder=builder,
-                joint_state=self._true_state,
-                true_pressure=self._pressure,
+                joint_state=state,
+                true_pressure=pressure,
                 parameters=self._variation.sensors,
-                joint_names=self.joints.names,
-                limits=self._q_limits,
-                period=self.scenario.control.period,
+                joint_names=joints.names,
+                limits=(joints.lower, joints.upper),
+                period=scenario.control.period,
                 # With the actuators' update: the joints are by then those of
                 # the tick, the pressures those of one step before.
-                lead=0.5 * self.scenario.plant_config.time_step,
+                lead=0.5 * scenario.plant_config.time_step,
             )
-            self._estimated_state = sensors.get_estimated_state_output_port()
-            self._pressure = sensors.get_chamber_pressure_output_port()
-        builder.ExportOutput(self._estimated_state, "affetto.estimated_state")
-        builder.ExportOutput(self._pressure, "affetto.chamber_pressure")
-        return sensors
+            return (
+                self.sensors.get_estimated_state_output_port(),
+                self.sensors.get_chamber_pressure_output_port(),
+            )
+
+        return AddPneumaticDriver(
+            PneumaticDriver(
+                joints={
+                    name: JointActuator() for name in scenario.active_joints
+                },
+                pneumatics=scenario.pneumatics,
+                control=scenario.control if controlled else None,
+            ),
+            self.plant,
+            self._robot,
+            builder,
+            sense if scenario.variation.enabled else None,
+            longest_delay=self._variation.actuators.longest_delay,
+        )
 
     def _add_teacher(
         self, builder: DiagramBuilder, mouse: Meshcat | None
@@ -403,40 +408,6 @@ class AffettoStation(Diagram):
             )
             pull = self.teacher.get_pulling_force_output_port()
         builder.ExportOutput(pull, "teacher.pulling_force")
-
-    def _add_actuation(self, builder: DiagramBuilder) -> None:
-        self._q_limits = world.joint_limits(self.plant, self.joints.names)
-        config = self.scenario.pneumatics
-        config.time_step = self.scenario.plant_config.time_step
-        self.actuation = PneumaticActuation.AddToBuilder(
-            builder=builder,
-            config=config,
-            joint_names=self.joints.names,
-            q_lower=self._q_limits[0],
-            q_upper=self._q_limits[1],
-            longest_delay=self._variation.actuators.longest_delay,
-        )
-        builder.Connect(
-            self._true_state,
-            self.actuation.get_estimated_state_input_port(),
-        )
-        spread = builder.AddNamedSystem(
-            "joint_actuation", MatrixGain(D=self.joints.actuation_matrix)
-        )
-        builder.Connect(
-            self.actuation.get_actuation_output_port(),
-            spread.get_input_port(),
-        )
-        builder.Connect(
-            spread.get_output_port(),
-            self.plant.get_actuation_input_port(self._robot),
-        )
-        _export(
-            builder,
-            "affetto",
-            self.actuation.get_actuation_output_port(),
-            self.actuation.get_mass_flow_output_port(),
-        )
 
     def _add_sight(self, builder: DiagramBuilder) -> None:
         # The renderers stand in a copy of the scene: a SceneGraph hands each
@@ -475,7 +446,7 @@ class AffettoStation(Diagram):
                 color_image=self.camera.get_color_image_output_port(),
                 config=self.scenario.blob,
             )
-        _export(
+        export(
             builder,
             "camera",
             self.camera.get_color_image_output_port(),
@@ -488,7 +459,7 @@ class AffettoStation(Diagram):
         self.microphone = DrumMicrophone.AddToBuilder(
             builder=builder, plant=self.plant
         )
-        _export(
+        export(
             builder,
             "drum",
             self.microphone.get_contact_force_output_port(),
@@ -540,7 +511,7 @@ class AffettoStation(Diagram):
             "policy_parameters",
             "start_time",
         )
-        _export(
+        export(
             builder,
             "affetto",
             self.policy.get_policy_parameters_output_port(),
@@ -560,15 +531,10 @@ class AffettoStation(Diagram):
         self, builder: DiagramBuilder, desired: OutputPort
     ) -> None:
         builder.ExportOutput(desired, "affetto.desired_state")
-        command = self.actuation.get_command_input_port()
-        if self.scenario.valve_source == "external":
+        if self.controller is None:
+            command = self.actuation.get_command_input_port()
             builder.ExportInput(command, f"affetto.{command.get_name()}")
             return
-        self.controller = PidfController.AddToBuilder(
-            builder=builder,
-            config=self.scenario.control,
-            joint_names=self.joints.names,
-        )
         self._gravity = builder.AddNamedSystem(
             "gravity_feedforward",
             GravityFeedforward(
@@ -581,21 +547,8 @@ class AffettoStation(Diagram):
         builder.Connect(desired, self._gravity.get_desired_state_input_port())
         builder.Connect(desired, self.controller.get_desired_state_input_port())
         builder.Connect(
-            self._estimated_state,
-            self.controller.get_estimated_state_input_port(),
-        )
-        builder.Connect(
-            self._pressure, self.controller.get_chamber_pressure_input_port()
-        )
-        connect(builder, self._gravity, self.controller, "equilibrium_offset")
-        builder.Connect(
-            self.controller.get_valve_opening_output_port(), command
-        )
-        _export(
-            builder,
-            "affetto",
-            self.controller.get_valve_opening_output_port(),
-            self.controller.get_pid_output_output_port(),
+            self._gravity.get_equilibrium_offset_output_port(),
+            self.controller.get_equilibrium_offset_input_port(),
         )
 
     def set_equilibrium_offset(
@@ -606,9 +559,3 @@ class AffettoStation(Diagram):
         It takes the place of the gravity that the controller compensates.
         """
         self._gravity.set_constant(self._sub(self._gravity, context), offset)
-
-
-def _export(builder: DiagramBuilder, part: str, *ports: OutputPort) -> None:
-    """Exports output ports under their own names, as parts of the robot."""
-    for port in ports:
-        builder.ExportOutput(port, f"{part}.{port.get_name()}")

@@ -60,3 +60,14 @@ def test_the_whole_is_checked_overlays_included(tmp_path):
         load_config(Outer, base, (over, wrong))
     with pytest.raises(InputError, match="no such file"):
         load_config(Outer, tmp_path / "none.yaml")
+
+
+def test_values_may_take_the_place_of_the_file(tmp_path):
+    over = write(tmp_path / "over.yaml", "rate: 20.0")
+    given = Outer(rate=50.0, inner=Inner(gain=3.0))
+    assert load_config(Outer, given) == given
+    changed = load_config(Outer, given, [over])
+    assert (changed.rate, changed.inner.gain) == (20.0, 3.0)
+    assert given.rate == 50.0
+    with pytest.raises(InputError, match=r"Outer\.rate is 0\.0"):
+        load_config(Outer, Outer(rate=0.0))

@@ -4,11 +4,7 @@ import numpy as np
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import (
-    ConstantVectorSource,
-    MatrixGain,
-    VectorLogSink,
-)
+from pydrake.systems.primitives import ConstantVectorSource, VectorLogSink
 import pytest
 
 from drake_affetto.common.errors import InputError
@@ -20,17 +16,17 @@ from drake_affetto.control.pidf import (
     pidf_update,
 )
 from drake_affetto.control.pidf_controller import PidfConfig, PidfController
-from drake_affetto.pneumatics.actuation import (
-    PneumaticActuation,
-    PneumaticActuationConfig,
+from drake_affetto.pneumatics.driver import (
+    AddPneumaticDriver,
+    PneumaticDriver,
 )
+from drake_affetto.pneumatics.parameters import JointActuator
 from drake_affetto.scene.world import (
     ACTIVE_JOINTS,
     WorldConfig,
     add_world,
-    get_joint,
     joint_limits,
-    select_joints,
+    robot_instance,
     set_posture,
     weld_inactive,
 )
@@ -195,57 +191,34 @@ class Body:
         add_world(plant, WorldConfig())
         weld_inactive(plant, ACTIVE_JOINTS)
         plant.Finalize()
-        robot = plant.GetModelInstanceByName("affetto")
-        selection = select_joints(plant, ACTIVE_JOINTS)
         self.lower, self.upper = joint_limits(plant, ACTIVE_JOINTS)
         n = self.n = len(ACTIVE_JOINTS)
-        self.actuation = PneumaticActuation.AddToBuilder(
-            builder=builder,
-            config=PneumaticActuationConfig(),
-            joint_names=ACTIVE_JOINTS,
-            q_lower=self.lower,
-            q_upper=self.upper,
-        )
-        self.controller = PidfController.AddToBuilder(
-            builder=builder, config=PidfConfig(), joint_names=ACTIVE_JOINTS
+        joints = {name: JointActuator() for name in ACTIVE_JOINTS}
+        self.systems = AddPneumaticDriver(
+            PneumaticDriver(joints, control=PidfConfig()),
+            plant,
+            robot_instance(plant),
+            builder,
         )
         self.reference = builder.AddSystem(
             ConstantVectorSource(np.zeros(2 * n))
         )
-        state = builder.AddSystem(MatrixGain(selection.state_matrix))
-        torque = builder.AddSystem(MatrixGain(selection.actuation_matrix))
         self.log = builder.AddSystem(VectorLogSink(2 * n, 0.01))
         self.pressure_log = builder.AddSystem(VectorLogSink(2 * n, 0.01))
-        pressure = self.actuation.get_chamber_pressure_output_port()
+        controller = self.systems.controller
         for source, target in (
-            (plant.get_state_output_port(robot), state.get_input_port()),
-            (
-                state.get_output_port(),
-                self.actuation.get_estimated_state_input_port(),
-            ),
-            (
-                state.get_output_port(),
-                self.controller.get_estimated_state_input_port(),
-            ),
             (
                 self.reference.get_output_port(),
-                self.controller.get_desired_state_input_port(),
-            ),
-            (pressure, self.controller.get_chamber_pressure_input_port()),
-            (
-                self.controller.get_valve_opening_output_port(),
-                self.actuation.get_command_input_port(),
+                controller.get_desired_state_input_port(),
             ),
             (
-                self.actuation.get_actuation_output_port(),
-                torque.get_input_port(),
+                self.systems.joint_state.get_output_port(),
+                self.log.get_input_port(),
             ),
             (
-                torque.get_output_port(),
-                plant.get_actuation_input_port(robot),
+                self.systems.actuation.get_chamber_pressure_output_port(),
+                self.pressure_log.get_input_port(),
             ),
-            (state.get_output_port(), self.log.get_input_port()),
-            (pressure, self.pressure_log.get_input_port()),
         ):
             builder.Connect(source, target)
         self.diagram = builder.Build()
@@ -259,20 +232,10 @@ class Body:
             plant_context,
             dict(zip(ACTIVE_JOINTS, map(float, start), strict=True)),
         )
-        gravity = -self.plant.CalcGravityGeneralizedForces(plant_context)
-        torque = [
-            gravity[get_joint(self.plant, j).velocity_start()]
-            for j in ACTIVE_JOINTS
-        ]
         self.reference.get_mutable_source_value(
             self.reference.GetMyMutableContextFromRoot(context)
         ).set_value(np.concatenate([desired, np.zeros(self.n)]))
-        actuation = self.actuation.GetMyMutableContextFromRoot(context)
-        p_a, p_b = self.actuation.pressures_for_torque(actuation, torque)
-        self.actuation.set_pressures(actuation, p_a, p_b)
-        self.controller.set_integral(
-            self.controller.GetMyMutableContextFromRoot(context), p_a - p_b
-        )
+        self.systems.hold_posture(self.diagram, context)
         Simulator(self.diagram, context).AdvanceTo(seconds)
         return (
             self.log.FindLog(context).data()[: self.n],
@@ -312,15 +275,24 @@ def test_default_gains_name_every_active_joint():
     assert set(ACTIVE_JOINTS) <= set(load_control().gains)
 
 
-def test_parameters_may_be_values_instead_of_files():
-    """For joints that no file of this repository knows."""
+def test_two_controllers_stand_in_one_diagram():
+    """Of joints that no file of this repository knows."""
     builder = DiagramBuilder()
-    gains = JointGains(kP=5e5, kI=3e5, kD=2.5e4, kF=1.5e-5)
-    system = PidfController.AddToBuilder(
-        builder=builder,
-        config=PidfConfig(),
-        joint_names=["elbow"],
-        parameters=ControlParameters(gains={"elbow": gains}),
+    parameters = ControlParameters(
+        gains={"knee": JointGains(), "leg": JointGains()}
     )
-    builder.Build()
-    assert system.get_valve_opening_output_port().size() == 1
+    state = builder.AddSystem(ConstantVectorSource(np.zeros(2)))
+    pressure = builder.AddSystem(ConstantVectorSource(np.full(2, 4e5)))
+    for name in ("left", "right"):
+        system = PidfController.AddToBuilder(
+            builder=builder,
+            joint_names=["hip" if name == "left" else "knee"],
+            estimated_state=state.get_output_port(),
+            chamber_pressure=pressure.get_output_port(),
+            config=PidfConfig(parameters),
+            actuator_classes={"hip": "leg"},
+            name=name,
+        )
+        assert system.get_valve_opening_output_port().size() == 1
+    diagram = builder.Build()
+    assert diagram.GetSubsystemByName("right") is system

@@ -18,6 +18,7 @@ from drake_affetto.pneumatics.actuation import (
     PneumaticActuationConfig,
 )
 from drake_affetto.pneumatics.chamber import Row
+from drake_affetto.pneumatics.equilibrium import pressures_for_torque
 from drake_affetto.pneumatics.parameters import (
     chamber_volumes,
     load_parameters,
@@ -27,7 +28,6 @@ from support.actuator_bench import (
     Actuators,
     closed,
     make_parameters,
-    one_joint,
 )
 
 N = 3
@@ -159,16 +159,6 @@ def test_torque_is_known_before_the_first_update():
     assert torque[0] == pytest.approx(expected)
 
 
-def test_pressures_for_torque_give_that_torque():
-    dut, context = fixed(area_ratio=0.85)
-    wanted = np.array([0.3, 0.0, -0.4])
-    dut.set_pressures(context, *dut.pressures_for_torque(context, wanted))
-    torque = dut.get_actuation_output_port().Eval(context)
-    np.testing.assert_allclose(torque, wanted, atol=1e-12)
-    p_a, p_b = dut.pressures_for_torque(context, [9.0, -9.0, 0.0])
-    assert np.all((p_a <= 659.3e3) & (p_b >= 101.3e3))
-
-
 def test_parameters_of_the_context_count():
     dut, context = fixed(n=1)
     other = dut.get_parameters(context)
@@ -201,27 +191,6 @@ def test_arguments_that_do_not_fit_are_named():
         dut.set_pressures(context, 3e5, [1e5, -1.0, 1e5])
     with pytest.raises(InputError, match=r"here\.mode"):
         PneumaticActuationConfig(mode="x").check("here")
-
-
-def test_add_to_builder_takes_the_models_of_the_robot():
-    builder = DiagramBuilder()
-    dut = PneumaticActuation.AddToBuilder(
-        builder=builder,
-        config=PneumaticActuationConfig(),
-        joint_names=["waist_roll", "right_elbow_flexion"],
-        q_lower=[-0.3, 0.0],
-        q_upper=[0.3, 2.2],
-    )
-    assert dut.num_joints == 2
-    assert dut.get_name() == "pneumatic_actuation"
-    with pytest.raises(InputError, match="knee"):
-        PneumaticActuation.AddToBuilder(
-            builder=builder,
-            config=PneumaticActuationConfig(),
-            joint_names=["knee"],
-            q_lower=[0.0],
-            q_upper=[1.0],
-        )
 
 
 class Arm:
@@ -334,7 +303,7 @@ def test_stiction_holds_while_the_pressure_difference_moves_by_60_kpa():
     context = dut.CreateDefaultContext()
     q, v, inertia, h = 1.0, 0.0, 2.5e-3, 0.001
     middle = 5e5
-    dut.set_pressures(context, *dut.pressures_for_torque(context, 0.0, middle))
+    dut.set_pressures(context, *pressures_for_torque(array, 0.0, middle))
     p0 = dut.get_chamber_pressure_output_port().Eval(context)
     simulator = Simulator(dut, context)
     moved = {}
@@ -355,20 +324,3 @@ def test_stiction_holds_while_the_pressure_difference_moves_by_60_kpa():
     # Δp swings by ±30 and by ±60 kPa about the balance.
     assert moved[30e3] < 0.3
     assert moved[60e3] > 3.0
-
-
-def test_parameters_may_be_values_instead_of_files():
-    """For joints that no file of this repository knows."""
-    builder = DiagramBuilder()
-    system = PneumaticActuation.AddToBuilder(
-        builder=builder,
-        config=PneumaticActuationConfig(),
-        joint_names=["joint"],
-        q_lower=[-1.0],
-        q_upper=[1.0],
-        parameters=one_joint(),
-        name="air",
-    )
-    diagram = builder.Build()
-    assert diagram.GetSubsystemByName("air") is system
-    assert system.get_actuation_output_port().size() == 1

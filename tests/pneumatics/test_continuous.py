@@ -8,6 +8,7 @@ from pydrake.autodiffutils import (
     ExtractGradient,
     InitializeAutoDiff,
 )
+from pydrake.symbolic import Expression, MakeVectorVariable
 from pydrake.systems.analysis import (
     ApplySimulatorConfig,
     Simulator,
@@ -24,6 +25,7 @@ from drake_affetto.pneumatics.continuous import (
     ContinuousPneumaticActuation,
     ContinuousPneumaticActuation_,
 )
+from drake_affetto.pneumatics.parameters import resting_pressure
 from support.actuator_bench import Actuators, make_parameters
 
 
@@ -145,13 +147,57 @@ def test_derivatives_are_those_of_finite_differences():
         )
 
 
-def test_twin_is_a_template_over_both_scalars():
+def test_twin_is_a_template_over_all_scalars():
     assert ContinuousPneumaticActuation is ContinuousPneumaticActuation_[float]
     dut = ContinuousPneumaticActuation(make_parameters(n=2), mode="regulator")
     assert not dut.HasAnyDirectFeedthrough()
     copy = dut.ToAutoDiffXd()
     assert isinstance(copy, ContinuousPneumaticActuation_[AutoDiffXd])
     assert copy.GetInputPort("pressure_command").size() == 4
+
+
+@pytest.mark.parametrize("mode", ["flow", "regulator"])
+def test_an_expression_evaluates_to_the_same_derivatives(mode):
+    """All that AutoDiffXd can, but for being differentiated by Drake."""
+    random = np.random.default_rng(3)
+    plain = ContinuousPneumaticActuation(
+        make_parameters(n=2, leak_conductance=5e-12), mode=mode
+    )
+    symbolic = plain.ToSymbolic()
+    variables = MakeVectorVariable(12, "x")
+    context = plain.CreateDefaultContext()
+    other = symbolic.CreateDefaultContext()
+    other.SetContinuousState([Expression(x) for x in variables])
+    command = [0.3, -0.6] if mode == "flow" else [2e5, 3e5, 4e5, 5e5]
+    for dut, each, wrap in (
+        (plain, context, float),
+        (symbolic, other, Expression),
+    ):
+        dut.get_command_input_port().FixValue(each, [*map(wrap, command)])
+        state = [*map(wrap, (0.1, -0.2, 0.5, -1.0))]
+        dut.get_estimated_state_input_port().FixValue(each, state)
+    rates = symbolic.EvalTimeDerivatives(other).CopyToVector()
+    for _ in range(10):
+        plain.set_pressures(context, *random.uniform(1.1e5, 6.5e5, (2, 2)))
+        plain.set_strokes(context, random.uniform(-1, 1, 2))
+        x = context.get_continuous_state_vector().CopyToVector()
+        values = dict(zip(variables, x, strict=True))
+        expected = plain.EvalTimeDerivatives(context).CopyToVector()
+        found = [rate.Evaluate(values) for rate in rates]
+        np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+def test_by_default_the_air_is_at_rest_in_the_middle_of_the_range():
+    array = make_parameters(q=(-0.4, 1.0), leak_conductance=5e-12)
+    dut = ContinuousPneumaticActuation(array)
+    context = dut.CreateDefaultContext()
+    dut.get_command_input_port().FixValue(context, [0.0])
+    dut.get_estimated_state_input_port().FixValue(context, [0.3, 0.0])
+    rest = resting_pressure(array)[0]
+    pressure = dut.get_chamber_pressure_output_port().Eval(context)
+    np.testing.assert_allclose(pressure, [rest, rest])
+    rate = dut.EvalTimeDerivatives(context).CopyToVector()
+    np.testing.assert_allclose(rate[:2], 0.0, atol=1e-3)
 
 
 def test_twin_needs_a_lag():

@@ -13,6 +13,7 @@ from drake_affetto.pneumatics.parameters import (
     PneumaticParameters,
     chamber_volumes,
     load_parameters,
+    parameter_array,
     resting_pressure,
 )
 
@@ -100,10 +101,16 @@ def test_unknown_joints_and_limits_are_named():
         simple().for_joints(["three"], [0.0], [1.0])
     with pytest.raises(InputError, match="q_lower"):
         simple().for_joints(["one"], [0.0, 1.0], [1.0])
-    with pytest.raises(
-        InputError, match=r"q_lower\[0\] is 1\.0, expected a number below"
-    ):
-        simple().for_joints(["one"], [1.0], [0.0])
+    for limits in ([1.0, 0.0], [-np.inf, np.inf], [0.0, np.nan]):
+        with pytest.raises(
+            InputError, match=r"range of joint one is .*, expected a finite"
+        ):
+            simple().for_joints(["one"], *np.transpose([limits]))
+
+
+def test_parameters_need_joints_to_be_an_array():
+    with pytest.raises(InputError, match="joints is None"):
+        parameter_array(simple())
 
 
 def test_resting_pressure_of_tight_valves_is_in_the_middle():

@@ -143,41 +143,6 @@ def test_inactive_joints_are_welded_where_they_stand():
     assert plant.CalcTotalMass(a) == pytest.approx(full.CalcTotalMass(b))
 
 
-def test_a_selection_picks_state_and_actuation_by_name(scene):
-    plant, context = scene.plant, scene.context
-    selection = world.select_joints(plant, ACTIVE)
-    robot = plant.GetModelInstanceByName("affetto")
-    rng = np.random.default_rng(0)
-    for name in world.joint_names(plant):
-        joint = world.get_joint(plant, name)
-        joint.set_angle(context, rng.uniform(-0.1, 0.1))
-        joint.set_angular_rate(context, rng.uniform(-1, 1))
-    state = plant.get_state_output_port(robot).Eval(context)
-    joints = [world.get_joint(plant, name) for name in ACTIVE]
-    expected = [j.get_angle(context) for j in joints] + [
-        j.get_angular_rate(context) for j in joints
-    ]
-    assert selection.state_matrix @ state == pytest.approx(expected)
-    n = len(ACTIVE)
-    assert state[selection.positions] == pytest.approx(expected[:n])
-    velocities = plant.GetVelocities(context, robot)
-    assert velocities[selection.velocities] == pytest.approx(expected[n:])
-    torque = np.arange(1.0, n + 1)
-    actuation = selection.actuation_matrix @ torque
-    assert actuation[selection.actuators] == pytest.approx(torque)
-    for i, name in enumerate(ACTIVE):
-        actuator = plant.GetJointActuatorByName(name, robot)
-        u = np.zeros(plant.num_actuated_dofs())
-        actuator.set_actuation_vector(np.array([torque[i]]), u)
-        assert actuation[u != 0] == pytest.approx([torque[i]])
-
-
-@pytest.mark.parametrize("names", [[], ["waist_yaw", "waist_yaw"]])
-def test_a_selection_is_not_empty_and_names_nothing_twice(scene, names):
-    with pytest.raises(InputError, match="none of them twice"):
-        world.select_joints(scene.plant, names)
-
-
 def test_limits_in_the_order_of_the_names(scene):
     low, high = world.joint_limits(
         scene.plant, ["right_elbow_flexion", "waist_yaw"]

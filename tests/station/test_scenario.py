@@ -5,6 +5,7 @@ import re
 import pytest
 
 from drake_affetto.common.errors import InputError
+from drake_affetto.robot.wire import load_wire
 from drake_affetto.station.scenario import (
     Scenario,
     load_scenario,
@@ -16,6 +17,9 @@ from drake_affetto.station.scenario import (
 def test_every_scenario_loads(name):
     scenario = load_scenario(name)
     assert isinstance(scenario, Scenario)
+    if scenario.wire:
+        assert scenario.active_joints == load_wire(scenario.wire).names
+        return
     assert len(scenario.active_joints) == 8
     assert scenario.active_joints[2] == scenario.yaw_joint == "waist_yaw"
 

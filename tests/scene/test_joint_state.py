@@ -1,11 +1,12 @@
 """Angles and speeds of one and the same time."""
 
 import numpy as np
+from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.analysis import Simulator
 import pytest
 
-from drake_affetto.scene.world import JointSelection
-from drake_affetto.station.joint_state import make_joint_state
+from drake_affetto.scene.joint_state import make_joint_state
+from drake_affetto.scene.joints import JointSelection
 
 H = 0.0025
 
@@ -17,7 +18,10 @@ def selection():
     state = np.zeros((2 * n, 2 * size))
     state[0, 2] = state[1, 0] = state[2, 5] = state[3, 3] = 1.0
     return JointSelection(
+        model_instance=ModelInstanceIndex(2),
         names=("b", "a"),
+        lower=np.full(n, -1.0),
+        upper=np.full(n, 1.0),
         positions=np.array([2, 0]),
         velocities=np.array([2, 0]),
         actuators=np.array([2, 0]),

@@ -1,0 +1,25 @@
+"""Viscous friction of joints that differs from the model's."""
+
+from collections.abc import Mapping
+
+from pydrake.multibody.plant import MultibodyPlant
+
+from drake_affetto.common.errors import require_range
+from drake_affetto.scene.world import get_joint
+
+
+def set_joint_damping(
+    plant: MultibodyPlant, damping: Mapping[str, float]
+) -> None:
+    """Sets the viscous friction of the robot's joints.
+
+    Args:
+        plant: Plant of the world, before `Finalize`.
+        damping: Joint -> N m s/rad; others keep the model's.
+
+    Raises:
+        InputError: For a joint that is not there, or a value that cannot be.
+    """
+    for name, value in damping.items():
+        require_range(f"joint_damping.{name}", value, 0.0, 100.0)
+        get_joint(plant, name).set_default_damping(value)
