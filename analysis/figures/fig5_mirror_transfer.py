@@ -66,7 +66,7 @@ def significance(axes, results, count) -> None:
     axes.set_xlim(-0.5, len(schemes) - 0.5)
     axes.set_ylim(len(schemes) - 0.5, -0.5)
     for row in results["comparisons"]:
-        if row["samples"] != count:
+        if row["samples"] != count or row["measure"] != "success":
             continue
         i, j = schemes.index(row["a"]), schemes.index(row["b"])
         # The row's scheme against the column's.

@@ -141,7 +141,7 @@ def posture_at(station, p_WPalm):
         station.plant.GetMyMutableContextFromRoot(context),
         result.GetSolution(ik.q()),
     )
-    state = station.GetOutputPort("affetto.estimated_state").Eval(context)
+    state = station.GetOutputPort("affetto.joint_state").Eval(context)
     return state[: station.num_joints]
 
 

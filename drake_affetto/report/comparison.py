@@ -65,6 +65,8 @@ class SchemeComparison:
         """From the results of `affetto mirror`."""
         tested = {}
         for row in results.comparisons:
+            if row.measure != "success":
+                continue
             found = Comparison(
                 row.difference, row.p_corrected, row.effect_size, row.p
             )

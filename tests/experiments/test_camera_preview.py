@@ -51,7 +51,8 @@ def test_the_gaze_settles_on_the_true_task_parameter(name):
     for seed in (0, 1):
         outcome = trials.gaze(xy, seed)
         assert outcome.found
-        assert outcome.duration < 2.0
+        # It turns by up to 45° at 0.8 rad/s at most, and settles.
+        assert outcome.duration < 3.0
         taus.append(outcome.task_parameter)
     truth = sight.task_parameters(xy, scenario.blob.calibration)[0]
     assert np.all(np.abs(np.array(taus) - truth) < 0.02)

@@ -43,17 +43,41 @@ def test_results_hold_what_is_promised(outcome):
     results = to_plain(outcome.results)
     assert list(results["schemes"]) == list(STUDY_SCHEMES)
     for scheme in results["schemes"].values():
-        assert list(scheme) == ["3", "4", "5"]
+        assert list(scheme) == ["2", "3", "4", "5"]
         for row in scheme.values():
             rate = row["success_rate"]
             assert rate["low"] <= rate["mean"] <= rate["high"]
             assert len(row["per_repeat"]) == 4
             assert len(row["rewards"]) == 4 * 5
+            assert len(row["landing"]) == 4 * 5
+            assert 0.0 <= row["grazes"] <= 1.0
             hits = np.array(row["rewards"]).reshape(4, 5) > 0.15
             assert row["per_repeat"] == hits.mean(axis=1).tolist()
-    assert len(results["comparisons"]) == 3 * 15
-    for row in results["comparisons"]:
-        assert row["p"] <= row["p_corrected"] <= 1.0
+    # Every pair by success; by landing the pairs that were named beforehand.
+    rows = results["comparisons"]
+    assert len(rows) == 4 * 15 + 4 * 2
+    assert sum(row["measure"] == "landing" for row in rows) == 4 * 2
+    primary = [row for row in rows if row["primary"]]
+    assert {
+        (row["a"], row["b"], row["samples"], row["measure"]) for row in primary
+    } == {
+        (*pair, samples, measure)
+        for pair in (
+            ("relearn", "transfer"),
+            ("relearn", "transfer_default"),
+        )
+        for samples in (2, 3)
+        for measure in ("success",)
+    } | {
+        (scheme, "relearn", samples, "landing")
+        for scheme in ("transfer", "transfer_default")
+        for samples in (2, 3)
+    }
+    for row in rows:
+        if row["measure"] == "success" or row["primary"]:
+            assert row["p"] <= row["p_corrected"] <= 1.0
+    chance = results["chance"]
+    assert chance["low"] <= chance["mean"] <= chance["high"]
     json.dumps(results, allow_nan=False)
 
 
@@ -87,7 +111,8 @@ def test_schemes_meet_the_same_trials(tmp_path):
     places = {(xy, seed) for xy, seed, _ in seen}
     assert len(places) == 2 * 3
     # What is left unchanged does not depend on the samples: it ran once.
-    assert len(seen) == 2 * 3 * (5 * 3 + 1)
+    # So did the constant stroke that is played blind.
+    assert len(seen) == 2 * 3 * (5 * 4 + 1 + 1)
 
 
 def test_halves_of_a_study_make_the_whole(tmp_path):
