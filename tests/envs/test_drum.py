@@ -10,6 +10,7 @@ import pytest
 
 from drake_affetto.common.errors import InputError
 from drake_affetto.envs.drum import DrumEnv
+from drake_affetto.experiments import trials
 
 NAMES = ["Affetto/Drum-v0", "Affetto/DrumMirror-v0"]
 FEW = {"lessons": 4, "directions": 2}
@@ -56,11 +57,11 @@ def test_seeds_reproduce_whatever_was_before():
         assert again[5]["impulse"] == first[5]["impulse"]
 
 
-def test_the_lessons_mean_is_heard_and_no_movement_is_not():
+def test_a_taught_movement_is_heard_and_no_movement_is_not():
     env = DrumEnv(**FEW)
     xy = [0.235, -0.09]
-    mean = env.movements.mean
-    for theta, success in ((mean, True), (0.0 * mean, False)):
+    taught = trials.runner("drumming").teach(np.array(xy), 1).theta
+    for theta, success in ((taught, True), (0.0 * taught, False)):
         env.movements.mean = theta
         *_, reward, _, _, info = episode(
             env, [0.0, 0.0], seed=1, options={"xy": xy}

@@ -90,7 +90,7 @@ def test_places_are_those_of_the_drum(reference):
 def test_the_optical_map_explains_the_mirror_and_the_affine_does_not(mirror):
     optical = view_maps.make_optical_map(mirror.view, mirror.reference)
     noise = view_maps.measurement_noise(mirror.reference)
-    few = [0, 5, 17, 30]
+    few = [0, 5, 12, 20]
     X, Y = mirror.target[few], mirror.source[few]
     fit = view_maps.fit_optical(X, Y, optical, noise)
     assert mirror.distance(fit.predict(mirror.target)).max() < 0.003
