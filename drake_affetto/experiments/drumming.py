@@ -143,6 +143,12 @@ def run_drum(executor: TrialExecutor, plan: DrumPlan) -> DrumResults:
     )
     tests = _plan_tests(plan, scenario, demonstrations, positions, seen)
     tests |= _plan_blind(plan, scenario, demonstrations, positions, seen)
+    # Place by place: trials of one place and seed share the search.
+    tests = dict(
+        sorted(
+            tests.items(), key=lambda each: (each[0].repeat, each[0].position)
+        )
+    )
     strikes = run_strikes(executor, "Drumming at test positions", tests)
     outcomes = [
         _Outcome(

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import copy
 import functools
 from typing import TYPE_CHECKING, Any
+import warnings
 
 import numpy as np
 
@@ -295,7 +296,10 @@ def fit_scheme(
             mapping=_mapping(scenario, direct, loaded.transfer.mapping),
             residual="smooth" if loaded.transfer.residual else None,
         )
-    return scheme.fit(tau, theta)
+    with warnings.catch_warnings():
+        # That few samples do not determine the map is what is studied.
+        warnings.simplefilter("ignore", UserWarning)
+        return scheme.fit(tau, theta)
 
 
 @functools.cache
