@@ -24,7 +24,7 @@ from support.serving import serving
 from support.wire_client import free_ports
 
 # A share of the gains of flow mode, where the inner loop is faster.
-GAIN = 0.5
+GAIN = 0.6
 MEAN = 401.3e3  # Pa, 300 kPa gauge
 # Time in which the arm comes to the start of the stroke, s.
 APPROACH = 3.0
@@ -201,5 +201,4 @@ def test_a_taught_stroke_sent_over_the_wire_strikes_the_simulated_drum():
     assert code == 0
     forces = [float(x) for x in re.findall(r"the drum: ([\d.]+) N", err)]
     assert forces
-    # In real time, and the drum is small: a graze on some machines.
-    assert max(forces) > 0.1
+    assert max(forces) > 0.5
