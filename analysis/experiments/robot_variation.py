@@ -17,6 +17,7 @@ from drake_affetto.experiments.repeatability import (
     measure_repeatability,
     replay_depth,
 )
+from drake_affetto.geometry.region import grid_inside
 from drake_affetto.station.scenario import load_scenario
 
 
@@ -57,26 +58,18 @@ def main() -> None:
         nargs="+",
         type=float,
         metavar="X Y",
-        help="drum's places [m] (default: a grid of 23 over the large region)",
+        help="drum's places [m] (default: a grid over its region)",
     )
     args = parser.parse_args()
     scenario = load_scenario(args.scenario)
     scenario.variation.enabled &= not args.off
     trials = TrialRunner(scenario)
     print_repeatability(trials, args.repeats)
-    places = np.reshape(args.places or _GRID, (-1, 2))
+    places = np.reshape(
+        args.places or grid_inside(scenario.drum_region.corners, 6), (-1, 2)
+    )
     print_depths(trials, places, args.seed)
 
-
-# Inside the polygon of yaw ±45°, and with the drum wholly on the table.
-_GRID = [
-    (x, y)
-    for x, last in ((0.16, 2), (0.209, 6), (0.258, 6), (0.307, 6), (0.356, 6))
-    for y in [round(-0.26 + 0.06 * k, 2) for k in range(last + 1)]
-    if (x, y) not in {(0.16, -0.26), (0.307, -0.26)}
-    and not (x > 0.35 and y < -0.14 - 1e-9)
-    and (x < 0.25 or y < 0.05)
-]
 
 if __name__ == "__main__":
     main()

@@ -9,6 +9,7 @@ judged by its sound.
 from collections.abc import Iterable, Sequence
 import copy
 import dataclasses
+from typing import Any
 
 import numpy as np
 
@@ -142,13 +143,6 @@ def run_drum(executor: TrialExecutor, plan: DrumPlan) -> DrumResults:
         (plan.seed, _TRIALS),
     )
     tests = _plan_tests(plan, scenario, demonstrations, positions, seen)
-    tests |= _plan_blind(plan, scenario, demonstrations, positions, seen)
-    # Place by place: trials of one place and seed share the search.
-    tests = dict(
-        sorted(
-            tests.items(), key=lambda each: (each[0].repeat, each[0].position)
-        )
-    )
     strikes = run_strikes(executor, "Drumming at test positions", tests)
     outcomes = [
         _Outcome(
@@ -174,54 +168,49 @@ def _plan_tests(
 ) -> dict[_Test, Spec | None]:
     """The trials of all orders, repeats and numbers of demonstrations.
 
+    With them those of each repeat's best constant stroke, played blind.
+
     Returns:
         For each trial its spec; None where the drum was not found.
     """
     tests: dict[_Test, Spec | None] = {}
     for repeat, known in enumerate(demonstrations):
         prototypes = stack_prototypes(known)
-        for order, sequence in _orders(plan, scenario, known, repeat).items():
-            skills = skills_by_count(
-                scenario.skill,
-                [known[i] for i in sequence],
-                trial_seed(plan.seed, HIDDEN, repeat),
-            )
-            for n in plan.tested_after:
-                if order == "active" and n in (1, plan.demonstrations):
-                    # First and last, both orders know the same.
-                    continue
-                for position, xy in enumerate(positions):
-                    tests[_Test(order, repeat, n, position)] = strike_if_seen(
-                        plan.scenario,
-                        xy,
-                        trial_seed(plan.seed, _TRIALS, repeat, position),
-                        seen[repeat, position],
-                        skills[n - 1],
-                        prototypes,
-                    )
+        movers = _movers(plan, scenario, known, repeat)
+        # Place by place: trials of one place and seed share the search.
+        for position, xy in enumerate(positions):
+            for (order, n), mover in movers.items():
+                tests[_Test(order, repeat, n, position)] = strike_if_seen(
+                    plan.scenario,
+                    xy,
+                    trial_seed(plan.seed, _TRIALS, repeat, position),
+                    seen[repeat, position],
+                    mover,
+                    prototypes,
+                )
     return tests
 
 
-def _plan_blind(
+def _movers(
     plan: DrumPlan,
     scenario: Scenario,
-    demonstrations: Sequence[Sequence[DemonstrationResult]],
-    positions: np.ndarray,
-    seen: dict[tuple[int, int], GazeResult],
-) -> dict[_Test, Spec | None]:
-    """The trials of each repeat's best constant stroke, played blind."""
-    return {
-        _Test(_BLIND, repeat, 0, position): strike_if_seen(
-            plan.scenario,
-            xy,
-            trial_seed(plan.seed, _TRIALS, repeat, position),
-            seen[repeat, position],
-            Movement(best_constant(known, scenario)),
-            stack_prototypes(known),
+    known: Sequence[DemonstrationResult],
+    repeat: int,
+) -> dict[tuple[str, int], Any]:
+    """What one repeat tests, by order and number of demonstrations."""
+    movers: dict[tuple[str, int], Any] = {}
+    for order, sequence in _orders(plan, scenario, known, repeat).items():
+        skills = skills_by_count(
+            scenario.skill,
+            [known[i] for i in sequence],
+            trial_seed(plan.seed, HIDDEN, repeat),
         )
-        for repeat, known in enumerate(demonstrations)
-        for position, xy in enumerate(positions)
-    }
+        for n in plan.tested_after:
+            # First and last, both orders know the same.
+            if order == "random" or n not in (1, plan.demonstrations):
+                movers[order, n] = skills[n - 1]
+    movers[_BLIND, 0] = Movement(best_constant(known, scenario))
+    return movers
 
 
 def _orders(

@@ -203,6 +203,7 @@ class TrialRunner:
         self.voice = DrumVoice(sound.voice)
         self.reward_config = sound.reward
         self.meshcat = meshcat
+        self._palm_chain = world.serial_chain(self.station.plant, "right_palm")
         self._settled: Context | None = None
         self._looked: _Look | None = None
         self._taps: list[Array] | None = None
@@ -396,10 +397,12 @@ class TrialRunner:
         """Positions (T, 3) of the palm, m in the world.
 
         Args:
-            state: Angles and speeds (T, 2n), rad and rad/s.
+            state: Angles of the n joints, rad, and whatever follows them, such
+                as their speeds (T, n or more).
         """
-        teacher = self.station.teacher
-        return np.array([teacher.palm(each)[0] for each in state])
+        names = self.station.joints.names
+        q = state[:, [names.index(name) for name in self._palm_chain.names]]
+        return self._palm_chain.pose(q)[:, :3, 3]
 
     def landing(self, recording: Recording) -> Landing:
         """Where the palm came down in the trial that has just ended.

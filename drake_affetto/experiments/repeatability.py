@@ -43,8 +43,7 @@ def measure_repeatability(
     """
     station = trials.station
     n = station.num_joints
-    lower, upper = world.joint_limits(station.plant, station.joints.names)
-    span = upper - lower
+    span = station.joints.upper - station.joints.lower
     recordings = [trials.strike(xy, theta, seed) for seed in seeds]
     q = np.stack([each.true_state[:, :n] for each in recordings])
     desired = recordings[0].desired_state[:, :n]
@@ -99,7 +98,7 @@ def replay_depth(trials: TrialRunner, xy: Array, seed: int) -> float:
     """
     xy = np.asarray(xy, float)
     guided = trials.teach(xy, seed)
-    taught = trials.palm_path(np.hstack([guided.q, np.zeros_like(guided.q)]))
+    taught = trials.palm_path(guided.q)
     low, high = world.drum_limits(
         trials.station.plant,
         trials.station.plant.GetMyContextFromRoot(trials.context),

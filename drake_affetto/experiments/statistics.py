@@ -153,16 +153,15 @@ def correct_primary(
         samples: The numbers of samples named beforehand.
     """
     named = {frozenset(pair) for pair in pairs}
-    primary = [
-        i
+    primary = {
+        i: row.p
         for i, row in enumerate(rows)
         if frozenset((row.a, row.b)) in named
         and row.samples in samples
         and row.p is not None
-    ]
-    corrected = holm([float(rows[i].p or 0.0) for i in primary])
+    }
     marked = list(rows)
-    for i, value in zip(primary, corrected, strict=True):
+    for i, value in zip(primary, holm([*primary.values()]), strict=True):
         marked[i] = dataclasses.replace(
             rows[i], p_corrected=value, primary=True
         )

@@ -21,7 +21,6 @@ from drake_affetto.experiments.trials import (
     trial_seed,
 )
 from drake_affetto.runner.executor import Result, Spec, TrialExecutor
-from drake_affetto.scene import world
 from drake_affetto.station.scenario import load_scenario
 
 SKILLS = (1, 2, 3, 5, 12)
@@ -134,24 +133,18 @@ def _outcome(
 
 
 def _arrival(trials: TrialRunner, recording: Recording) -> Arrival | None:
-    station = trials.station
     force = recording.contact_force[:, 0]
     late = np.flatnonzero(force > _ARRIVED)
     if not late.size:
         return None
     around = slice(max(int(late[0]) - 1, 0), int(late[0]) + 1)
     time = float(np.interp(_ARRIVED, force[around], recording.t[around]))
-    posture = {
-        name: float(np.interp(time, recording.joint_t, angle))
-        for name, angle in zip(
-            station.joints.names,
-            recording.joint_state[:, : station.num_joints].T,
-            strict=True,
-        )
-    }
-    chain = world.serial_chain(station.plant, "right_palm")
-    X_WP = chain.pose(chain.posture(posture))
-    return Arrival(time, X_WP[:2, 3].tolist())
+    state = [
+        np.interp(time, recording.joint_t, each)
+        for each in recording.joint_state.T
+    ]
+    (palm,) = trials.palm_path(np.array([state]))
+    return Arrival(time, palm[:2].tolist())
 
 
 def run_step_convergence(

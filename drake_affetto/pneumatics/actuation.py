@@ -295,11 +295,6 @@ class PneumaticActuation(LeafSystem):
         vector = context.get_mutable_numeric_parameter(self._breath_index)
         vector.SetFromVector(np.zeros(4))
 
-    def trial_parameters(self, context: Context) -> NDArray[np.float64]:
-        """A copy of the (ROWS, n) array that the present trial has drawn."""
-        vector = context.get_numeric_parameter(self._trial_index)
-        return vector.CopyToVector().reshape(self._shape)
-
     def vary(
         self, context: Context, variation: ActuatorVariation, seed: int
     ) -> None:

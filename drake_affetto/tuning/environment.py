@@ -62,7 +62,6 @@ class TrackingEnvironment:
         )
         from pydrake.trajectories import PiecewisePolynomial
 
-        from drake_affetto.scene.world import joint_limits
         from drake_affetto.station.station import AffettoStation
 
         self._polynomial = PiecewisePolynomial
@@ -93,7 +92,8 @@ class TrackingEnvironment:
         ]
         self._simulator = Simulator(builder.Build())
         self._context = self._simulator.get_mutable_context()
-        self.lower, self.upper = joint_limits(self.station.plant, self.names)
+        joints = self.station.joints
+        self.lower, self.upper = joints.lower, joints.upper
         self.space: JointRange = joint_range(
             tuning,
             self.names,
