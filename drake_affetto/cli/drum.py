@@ -1,5 +1,6 @@
 """`affetto drum`: learning to drum from demonstrations (paper Figs. 3b, 3c)."""
 
+import argparse
 from typing import TYPE_CHECKING, Any
 
 from drake_affetto.cli.study_command import Call, StudyCommand, rate_text
@@ -15,7 +16,9 @@ class DrumCommand(StudyCommand[DrumPlan]):
     plan = DrumPlan
     out = "out/drum"
 
-    def scenarios(self, plan: DrumPlan) -> tuple[str, ...]:
+    def scenarios(
+        self, plan: DrumPlan, args: argparse.Namespace
+    ) -> tuple[str, ...]:
         """That of the plan."""
         return (plan.scenario,)
 

@@ -25,6 +25,7 @@ from drake_affetto.perception.blob import BlobCalibration
 from drake_affetto.perception.camera_model import CameraModel
 from drake_affetto.perception.config import rotation_matrix
 from drake_affetto.perception.optical_map import OpticalMap
+from drake_affetto.scene.parts import find_frame
 from drake_affetto.station.scenario import load_scenario
 from drake_affetto.station.station import AffettoStation
 
@@ -67,7 +68,7 @@ class ViewDomain:
 
     def base_pose(self) -> Array:
         """X_WB (4, 4) of the robot's base."""
-        frame = self.station.plant.GetFrameByName("affetto_base")
+        frame = find_frame(self.station.plant, "affetto_base")
         context = self.station.plant.GetMyContextFromRoot(self.context)
         return frame.CalcPoseInWorld(context).GetAsMatrix4()
 

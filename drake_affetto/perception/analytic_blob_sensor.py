@@ -28,8 +28,8 @@ from drake_affetto.perception.config import CameraConfig
 from drake_affetto.perception.mirror_camera import (
     CameraSnapshot,
     MirrorCamera,
-    find_frame,
 )
+from drake_affetto.scene.parts import find_frame
 
 
 class AnalyticBlobSensor(BlobReporter):
@@ -86,7 +86,7 @@ class AnalyticBlobSensor(BlobReporter):
         self._camera = camera
         self._model = camera.model()
         self._radius = radius
-        frame = find_frame(plant, marker)
+        frame = find_frame(plant, marker, "marker")
         self._marker_id = _frame_id(plant, frame.body().index())
         self._X_BD = frame.GetFixedPoseInBodyFrame()
         self._robot_ids: list[FrameId] = []

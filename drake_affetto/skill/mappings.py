@@ -301,3 +301,47 @@ def _turns(
     basis *= np.exp(0.3 * random.normal(size=(missing, 1, 1)))
     turns += [("random", turn[:n_out, :n_in]) for turn in basis]
     return turns[:count]
+
+
+# Samples that spread less than this across their longest extent are a line.
+_THIN = 0.03
+
+
+def lost_parameters(mapping: Mapping, parameters: Array, X: Array) -> int:
+    """How many parameters of a map samples leave open because of their place.
+
+    Samples on a line do not tell an affine map of a plane, however many.
+
+    Args:
+        mapping: The map.
+        parameters: Parameters (P,) at which it is linearized.
+        X: Samples (N, n).
+
+    Returns:
+        The number of parameters that samples all around would determine, but
+        these do not; those that differ hardly from a line count as on it.
+    """
+    unit = Domain.of_samples(X).deviation
+    mean = X.mean(axis=0)
+    left, size, right = np.linalg.svd((X - mean) / unit, full_matrices=False)
+    size = np.where(size > _THIN * size[0], size, 0.0)
+    flattened = mean + ((left * size) @ right) * unit
+    cloud = np.random.default_rng(0).standard_normal(
+        (2 * len(parameters), X.shape[1])
+    )
+    return max(
+        _rank(mapping.derivative(parameters, mean + cloud * unit))
+        - _rank(mapping.derivative(parameters, flattened)),
+        0,
+    )
+
+
+def _rank(derivative: Array) -> int:
+    """The rank of ∂h/∂p (N, d, P) over all samples."""
+    stacked = derivative.reshape(-1, derivative.shape[-1])
+    if not np.isfinite(stacked).all():
+        return 0
+    length = np.linalg.norm(stacked, axis=0)
+    return int(
+        np.linalg.matrix_rank(stacked / np.where(length > 0.0, length, 1.0))
+    )

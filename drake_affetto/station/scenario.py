@@ -5,31 +5,18 @@ import difflib
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike
 from pydrake.multibody.plant import MultibodyPlantConfig
 from pydrake.systems.analysis import SimulatorConfig
 
 from drake_affetto.common.errors import (
     InputError,
     require,
-    require_array,
     require_choice,
-    require_interval,
     require_range,
 )
-from drake_affetto.common.resources import models_dir
-from drake_affetto.common.typing import Array, Mask
+from drake_affetto.common.resources import models_dir, resolve
 from drake_affetto.common.yaml_config import read_yaml, typed
 from drake_affetto.control.pidf_controller import PidfConfig
-from drake_affetto.geometry.optics import (
-    polygon_area,
-    polygon_area_centroid,
-)
-from drake_affetto.geometry.region import (
-    crosses_itself,
-    inside_polygon,
-)
 from drake_affetto.motion.dmp_config import DmpConfig
 from drake_affetto.perception.blob import BlobConfig
 from drake_affetto.perception.config import (
@@ -42,69 +29,17 @@ from drake_affetto.pneumatics.actuation import PneumaticActuationConfig
 from drake_affetto.scene.world import ACTIVE_JOINTS, WorldConfig
 from drake_affetto.skill.policy import SkillPolicyConfig
 from drake_affetto.sound.config import load_sound_config
+from drake_affetto.station.drake_config import (
+    check_plant_config,
+    check_simulator_config,
+)
+from drake_affetto.station.drum_region import DrumRegion
+from drake_affetto.station.model_check import check_models_once
 from drake_affetto.station.variation import VariationConfig
 from drake_affetto.teaching.stroke import TeacherConfig
 
-LONGEST_STEP = 5e-3
-"""The longest step of the plant, s. Up to it outcomes are those of a step of
-0.25 ms, within the limits of docs/step_convergence.md."""
-
-# The smallest region that a drum is put into, m².
-_LEAST_REGION = 1e-4
-
 # A file names here the scenario whose values hold where it is silent.
 _EXTENDS = "extends"
-
-
-@dataclasses.dataclass
-class DrumRegion:
-    """Where trials put the drum's center: on the table, in the world frame.
-
-    Attributes:
-        x: lower and upper limit of a box, m.
-        y: lower and upper limit of a box, m.
-        polygon: corners [x, y] in order, m; where there are any, they are the
-            region and the box is not used.
-    """
-
-    x: list[float] = dataclasses.field(default_factory=lambda: [0.2, 0.27])
-    y: list[float] = dataclasses.field(default_factory=lambda: [-0.15, -0.03])
-    polygon: list[list[float]] = dataclasses.field(default_factory=list)
-
-    def check(self, where: str) -> None:
-        """Raises InputError for what is no interval or no polygon."""
-        for name in ("x", "y"):
-            require_interval(f"{where}.{name}", getattr(self, name))
-        if not self.polygon:
-            return
-        where = f"{where}.polygon"
-        for i, corner in enumerate(self.polygon):
-            require_array(f"{where}[{i}]", corner, (2,))
-        require(
-            len(self.polygon) >= 3
-            and bool(polygon_area(self.corners) > _LEAST_REGION)
-            and not crosses_itself(self.corners),
-            where,
-            self.polygon,
-            "three corners or more around at least 1 cm², in order",
-        )
-
-    @property
-    def corners(self) -> Array:
-        """(k, 2), in order, m."""
-        if self.polygon:
-            return np.array(self.polygon, dtype=float)
-        (x0, x1), (y0, y1) = self.x, self.y
-        return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
-
-    @property
-    def middle(self) -> Array:
-        """Center of its area (2,), m."""
-        return polygon_area_centroid(self.corners)[1]
-
-    def contains(self, xy: ArrayLike) -> Mask:
-        """Whether places (..., 2), m, are in the region or on its border."""
-        return inside_polygon(self.corners, xy)
 
 
 @dataclasses.dataclass
@@ -291,11 +226,9 @@ class Scenario:
         require_range(
             f"{where}.settling_duration", self.settling_duration, 0.1, 60
         )
-        require_range(
-            f"{where}.plant_config.time_step",
-            self.plant_config.time_step,
-            1e-5,
-            LONGEST_STEP,
+        check_plant_config(self.plant_config, f"{where}.plant_config")
+        check_simulator_config(
+            self.simulator_config, f"{where}.simulator_config"
         )
         require(
             len(set(self.active_joints)) == len(self.active_joints) > 0,
@@ -323,6 +256,11 @@ class Scenario:
             "'flow' where the valves are controlled by PIDF (Eq. 7)",
         )
         load_sound_config(self.sound)
+        if self.wire or self.hardware:
+            try:
+                resolve(self.wire)
+            except InputError as error:
+                raise InputError(f"{where}.wire: {error}") from None
         for i, mirror in enumerate(self.mirrors):
             mirror.check(f"{where}.mirrors[{i}]")
         for field in dataclasses.fields(self):
@@ -335,8 +273,27 @@ class Scenario:
             self.world.drum_position,
             f"a place in {where}.drum_region",
         )
+        self._check_transfer(where)
         # Last: a rate that is no number above 0 is told as such.
         self._check_periods(where)
+
+    def _check_transfer(self, where: str) -> None:
+        """Raises InputError for the optical map where nothing is mirrored."""
+        if self.transfer.mapping != "optical":
+            return
+        mapping = f"{where}.transfer.mapping 'optical'"
+        require(
+            len(self.mirrors) == 1,
+            f"{where}.mirrors",
+            [each.frame for each in self.mirrors],
+            f"one mirror for {mapping}",
+        )
+        require(
+            self.look.mode == "fixed_yaw",
+            f"{where}.look.mode",
+            self.look.mode,
+            f"'fixed_yaw' for {mapping}",
+        )
 
     def _check_periods(self, where: str) -> None:
         """Raises InputError for a period that is not a number of steps."""
@@ -373,11 +330,13 @@ def load_scenario(name: str | Path) -> Scenario:
 
     Raises:
         InputError: if there is no such scenario, it is not YAML, or a field
-            is unknown, of the wrong type or out of range.
+            is unknown, of the wrong type, out of range, or does not fit the
+            models.
     """
     path = _find(name)
     scenario = _load(path, ())
     scenario.check(path.stem)
+    check_models_once(scenario, path.stem)
     return scenario
 
 

@@ -53,10 +53,12 @@ from drake_affetto.sensing.joint_sensors import JointSensors
 from drake_affetto.skill.policy import SkillPolicy
 from drake_affetto.sound.microphone import DrumMicrophone
 from drake_affetto.station.gaze_turn import add_gaze_turn
+from drake_affetto.station.model_check import check_scene
 from drake_affetto.station.scenario import Scenario
 from drake_affetto.teaching.kinesthetic_teacher import KinestheticTeacher
 from drake_affetto.teaching.mouse_teacher import MouseTeacher
 
+_PALM = "affetto::right_palm"
 _MODES = {"centre": GazeMode.CENTER, "fixed_yaw": GazeMode.FIXED_YAW}
 
 
@@ -195,6 +197,7 @@ class AffettoStation(Diagram):
             )
         builder.BuildInto(self)
         self.set_name("affetto_station")
+        check_scene(self, self.plant, self.camera, scenario, "scenario")
 
     @property
     def num_joints(self) -> int:
@@ -393,6 +396,7 @@ class AffettoStation(Diagram):
                 scene_graph=self.scene_graph,
                 meshcat=mouse,
                 config=teaching,
+                palm_frame=_PALM,
             )
             pull = self.mouse_teacher.get_pulling_force_output_port()
         else:
@@ -401,6 +405,7 @@ class AffettoStation(Diagram):
                 plant=self.plant,
                 joint_names=self.joints.names,
                 config=teaching,
+                palm_frame=_PALM,
             )
             builder.Connect(
                 self._true_state,
