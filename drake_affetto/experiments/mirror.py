@@ -50,7 +50,7 @@ from drake_affetto.runner.executor import Spec, TrialExecutor
 from drake_affetto.station.scenario import load_scenario
 
 # What the seeds of this study are for; the skill's are those of the drum study.
-_TARGET, _TESTS, _CHOICE, _TRIALS = range(100, 104)
+_TARGET, _TESTS, _CHOICE, _TRIALS, _KNOWLEDGE = range(100, 105)
 
 # In place of a scheme: no skill at all, one and the same stroke everywhere.
 _BLIND = "blind"
@@ -195,7 +195,12 @@ def run_mirror(executor: TrialExecutor, plan: MirrorPlan) -> MirrorOutcome:
                 np.random.default_rng([plan.seed, _CHOICE, number, count]),
             )
             samples = [repeat.pool[i] for i in chosen]
-            schemes = _fit_schemes(plan, repeat.skill, samples)
+            schemes = _fit_schemes(
+                plan,
+                repeat.skill,
+                samples,
+                trial_seed(plan.seed, _KNOWLEDGE, number),
+            )
             movers |= {(name, count): each for name, each in schemes.items()}
             if number == 0 and count == max(plan.samples):
                 shown, shown_samples = schemes, samples
@@ -265,13 +270,22 @@ def _teach(
 
 
 def _fit_schemes(
-    plan: MirrorPlan, skill: Any, samples: Sequence[DemonstrationResult]
+    plan: MirrorPlan,
+    skill: Any,
+    samples: Sequence[DemonstrationResult],
+    knowledge: int,
 ) -> dict[str, Any]:
-    """All schemes of the plan, fitted to the same samples."""
+    """All schemes of the plan, fitted to the same samples.
+
+    `knowledge` is the seed of how wrongly the robot knows its camera, the
+    same for all numbers of samples.
+    """
     tau = task_parameters(samples)
     theta = np.array([each.theta for each in samples])
     return {
-        name: fit_scheme(name, skill, tau, theta, plan.scenario, plan.direct)
+        name: fit_scheme(
+            name, skill, tau, theta, plan.scenario, plan.direct, knowledge
+        )
         for name in plan.schemes
     }
 

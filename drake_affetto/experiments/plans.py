@@ -7,7 +7,7 @@ import dataclasses
 
 from drake_affetto.common.errors import require, require_choice, require_range
 from drake_affetto.common.fields import check_ranges, number, option
-from drake_affetto.skill.scheme_names import PAPER_SCHEMES, STUDY_SCHEMES
+from drake_affetto.skill.scheme_names import PAPER_SCHEMES, SCHEMES
 
 GREATEST_SEED = 2**31 - 1
 
@@ -82,7 +82,7 @@ class MirrorPlan(Plan):
             the skill is learned.
         pool: Number of demonstrations in the changed view, from which samples
             are drawn; None for the paper's 6, or as many as the most samples.
-        schemes: Schemes that are compared, see `STUDY_SCHEMES`.
+        schemes: Schemes that are compared, see `SCHEMES`.
         choice: How samples are chosen, at "random" or "spread" out.
         variability: Factor of the teacher's variation.
         workspace: Share of the region's length and width that is used.
@@ -93,7 +93,10 @@ class MirrorPlan(Plan):
 
     scenario: str = "mirror"
     samples: tuple[int, ...] = number(
-        (2, 3, 4, 5), 2, 100, "numbers of demonstrations that schemes are given"
+        (1, 2, 3, 4, 5),
+        1,
+        100,
+        "numbers of demonstrations schemes are given",
     )
     repeats: int = number(
         20, 1, 1000, "independent repeats, each with another skill and teacher"
@@ -103,7 +106,7 @@ class MirrorPlan(Plan):
         25, 3, 1000, "number of demonstrations in direct view"
     )
     pool: int | None = None
-    schemes: tuple[str, ...] = STUDY_SCHEMES
+    schemes: tuple[str, ...] = SCHEMES
     choice: str = "random"
     variability: float = number(1.0, 0.0, 10.0)
     workspace: float = number(1.0, 0.05, 1.0)

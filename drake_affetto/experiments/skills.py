@@ -24,9 +24,15 @@ from drake_affetto.experiments.trials import (
 )
 from drake_affetto.geometry.region import grid_inside
 from drake_affetto.runner.executor import Key, Spec, TrialExecutor
-from drake_affetto.station.scenario import Scenario, SkillConfig, load_scenario
+from drake_affetto.station.scenario import (
+    Scenario,
+    SkillConfig,
+    TransferConfig,
+    load_scenario,
+)
 
 if TYPE_CHECKING:
+    from drake_affetto.perception.optical_map import OpticalMap
     from drake_affetto.skill.elm import ElmRegressor
     from drake_affetto.skill.mappings import Mapping as MapFamily
 
@@ -270,6 +276,7 @@ def fit_scheme(
     theta: np.ndarray,
     scenario: str,
     direct: str,
+    seed: int = 0,
 ) -> Any:
     """One scheme of the paper's comparison, fitted to what is new.
 
@@ -280,6 +287,7 @@ def fit_scheme(
         theta: (N, F) demonstrated there.
         scenario: of the new condition, by name or path.
         direct: in which the skill was learned, by name or path.
+        seed: of the errors with which the optical map knows the camera.
 
     Returns:
         A fitted regressor from τ̂ to θ.
@@ -293,7 +301,7 @@ def fit_scheme(
     scheme = make_scheme(name, source, input_range=loaded.skill.input_range)
     if name == "transfer_default":
         scheme.set_params(
-            mapping=_mapping(scenario, direct, loaded.transfer.mapping),
+            mapping=_mapping(loaded.transfer, scenario, direct, seed),
             residual="smooth" if loaded.transfer.residual else None,
         )
     with warnings.catch_warnings():
@@ -302,16 +310,29 @@ def fit_scheme(
         return scheme.fit(tau, theta)
 
 
-@functools.cache
-def _mapping(scenario: str, direct: str, name: str) -> "str | MapFamily":
+def _mapping(
+    transfer: TransferConfig, scenario: str, direct: str, seed: int
+) -> "str | MapFamily":
     """The family of maps that a scenario names."""
-    if name != "optical":
-        return name
+    if transfer.mapping != "optical":
+        return transfer.mapping
+    from drake_affetto.experiments.view_maps import with_wrong_camera
+    from drake_affetto.skill.optical import OpticalMapping
+
+    believed = with_wrong_camera(
+        _optical_map(scenario, direct),
+        transfer.errors,
+        np.random.default_rng(seed),
+    )
+    return OpticalMapping(**vars(believed) | {"plane": transfer.plane})
+
+
+@functools.cache
+def _optical_map(scenario: str, direct: str) -> "OpticalMap":
+    """The optical map between two scenarios, with the camera as it is."""
     from drake_affetto.experiments.view_maps import (
         ViewDomain,
         make_optical_map,
     )
-    from drake_affetto.skill.optical import OpticalMapping
 
-    optical = make_optical_map(ViewDomain.of(scenario), ViewDomain.of(direct))
-    return OpticalMapping(**vars(optical))
+    return make_optical_map(ViewDomain.of(scenario), ViewDomain.of(direct))

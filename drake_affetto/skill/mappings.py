@@ -70,6 +70,18 @@ class Domain:
 class Mapping(abc.ABC):
     """h(x; p): a family of maps with parameters p (P,)."""
 
+    def expectation(self, parameters: Array) -> tuple[Array, Array] | None:
+        """What is known of the parameters before any sample, if anything.
+
+        Args:
+            parameters: (S, P).
+
+        Returns:
+            Residuals (S, R), each of unit standard deviation, and their
+            derivatives (S, R, P); or None.
+        """
+        return None
+
     @abc.abstractmethod
     def count(self, n_in: int, n_out: int) -> int:
         """P, for maps from n_in to n_out inputs."""

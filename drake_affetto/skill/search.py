@@ -35,6 +35,8 @@ class Prior:
         moments: weight of each point in a comparison of mean and covariance.
         shape: weight of an affine map's distortion.
         scale: by which H is divided before its distortion is judged.
+        expected: weight of the squared residuals of what the map's family
+            expects of its parameters.
     """
 
     domain: Domain
@@ -42,6 +44,7 @@ class Prior:
     moments: float
     shape: float
     scale: float
+    expected: float = 0.0
 
 
 class Objective:
@@ -101,6 +104,7 @@ class Objective:
             for weight, term in (
                 (self._prior.moments, self._moments),
                 (self._prior.shape, self._distortion),
+                (self._prior.expected, self._unexpected),
             ):
                 if weight > 0.0:
                     residual, change = term(parameters, moved, slope)
@@ -163,6 +167,18 @@ class Objective:
             root * np.concatenate(residuals, axis=1),
             root * np.concatenate(changes, axis=1),
         )
+
+    def _unexpected(
+        self, parameters: Array, moved: Array, slope: Array
+    ) -> tuple[Array, Array]:
+        """How far parameters are from what their family expects.
+
+        Returns:
+            Residuals (S, R) and their derivatives (S, R, P).
+        """
+        known = self._mapping.expectation(parameters)
+        assert known is not None
+        return known
 
     def _distortion(
         self, parameters: Array, moved: Array, slope: Array

@@ -132,7 +132,8 @@ class TransferRegressor(
             "moments": all that, and the x are tasks drawn like those of the
             skill, so h(x) has their mean and covariance; for many x. "auto":
             "moments" if there are unlabeled inputs, else "similar"; None if
-            it is not known where the skill was learned.
+            it is not known where the skill was learned. With any of them,
+            what the mapping itself expects of its parameters counts too.
         noise: the error to be expected of the skill itself, relative to the
             standard deviation of its outputs. It scales prior and average.
         metric: how residuals of several outputs are weighed. None: all alike.
@@ -215,7 +216,8 @@ class TransferRegressor(
         """Finds h from samples X (N, n_features) with known outputs y (N, F).
 
         Args:
-            X: (N, n_features), N at least 2.
+            X: (N, n_features). A single sample leaves most of a map to what
+                is expected of it.
             y: (N, F), or (N,) if the estimator predicts single numbers.
             X_unlabeled: (M, n_features), further inputs whose outputs are
                 not known, of tasks like those of the skill.
@@ -229,12 +231,13 @@ class TransferRegressor(
         X, targets, unlabeled = self._validate(X, y, X_unlabeled, source)
         mapping = make_mapping(self.mapping)
         n_in = X.shape[1]
-        mapping.count(n_in, source.n_in)
+        nothing = np.zeros((1, mapping.count(n_in, source.n_in)))
+        expects = mapping.expectation(nothing) is not None
         domain = self._source_domain(source)
         target = Domain.of_samples(np.concatenate([X, unlabeled]))
         reduced, wanted, rest, noise = self._whiten(source, targets, domain)
         kind = self._prior_kind(mapping, domain, n_in, source.n_in, unlabeled)
-        prior = _make_prior(kind, domain, target, noise)
+        prior = _make_prior(kind, domain, target, noise, expects)
         alpha = self.alpha
         if alpha is None:
             alpha = _PLAIN_ALPHA if prior is None else 0.0
@@ -328,7 +331,6 @@ class TransferRegressor(
             multi_output=True,
             y_numeric=True,
             dtype=np.float64,
-            ensure_min_samples=2,
         )
         checked = np.asarray(checked)
         targets = np.asarray(targets, dtype=np.float64)
@@ -340,7 +342,7 @@ class TransferRegressor(
                 f"y has {targets.shape[1]} outputs, but the estimator of this "
                 f"{type(self).__name__} predicts {source.n_out}"
             )
-        if np.all(checked == checked[0]):
+        if len(checked) > 1 and np.all(checked == checked[0]):
             raise ValueError(
                 "X is constant: all samples have the same input "
                 f"{checked[0].tolist()}, which no map can tell apart"
@@ -561,17 +563,21 @@ def _make_prior(
     domain: Domain | None,
     target: Domain,
     noise: float,
+    expects: bool,
 ) -> Prior | None:
     if not terms or domain is None:
         return None
     many = "moments" in terms
-    spread = np.trace(domain.covariance) / np.trace(target.covariance)
+    # A single sample has no spread.
+    seen = float(np.trace(target.covariance)) or 1.0
+    spread = np.trace(domain.covariance) / seen
     return Prior(
         domain=domain,
         inside=noise * (_MANY_INSIDE if many else _INSIDE),
         moments=noise * _MANY_MOMENTS if many else 0.0,
         shape=noise * _SHAPE if "shape" in terms else 0.0,
         scale=math.sqrt(spread) if spread > 0.0 else 1.0,
+        expected=noise if expects else 0.0,
     )
 
 

@@ -25,6 +25,8 @@ from drake_affetto.perception.config import (
     RenderConfig,
 )
 from drake_affetto.perception.gaze import GazeConfig
+from drake_affetto.perception.knowledge import CalibrationError
+from drake_affetto.perception.optical_map import PlaneExpectation
 from drake_affetto.pneumatics.actuation import PneumaticActuationConfig
 from drake_affetto.scene.world import ACTIVE_JOINTS, WorldConfig
 from drake_affetto.skill.policy import SkillPolicyConfig
@@ -105,10 +107,19 @@ class TransferConfig:
             camera is known.
         residual: whether what the map leaves over is learned too, as a smooth
             departure.
+        plane: where the optical map expects a mirror.
+        errors: how wrongly it knows the camera; drawn once a repeat of a
+            study. Nobody measures a camera exactly.
     """
 
     mapping: str = "affine"
     residual: bool = False
+    plane: PlaneExpectation = dataclasses.field(
+        default_factory=PlaneExpectation
+    )
+    errors: CalibrationError = dataclasses.field(
+        default_factory=CalibrationError
+    )
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that does not fit."""
@@ -119,6 +130,8 @@ class TransferConfig:
             self.mapping,
             f"one of {', '.join(known)}",
         )
+        self.plane.check(f"{where}.plane")
+        self.errors.check(f"{where}.errors")
 
 
 @dataclasses.dataclass

@@ -15,7 +15,7 @@ from drake_affetto.experiments.skills import fit_scheme, make_skill
 from drake_affetto.experiments.trials import run_task
 from drake_affetto.runner.executor import TrialExecutor
 from drake_affetto.runner.store import TrialStore
-from drake_affetto.skill.scheme_names import STUDY_SCHEMES
+from drake_affetto.skill.scheme_names import SCHEMES
 from drake_affetto.station.scenario import load_scenario
 from support import fake_world
 
@@ -41,7 +41,7 @@ def outcome(tmp_path_factory):
 
 def test_results_hold_what_is_promised(outcome):
     results = to_plain(outcome.results)
-    assert list(results["schemes"]) == list(STUDY_SCHEMES)
+    assert list(results["schemes"]) == list(SCHEMES)
     for scheme in results["schemes"].values():
         assert list(scheme) == ["2", "3", "4", "5"]
         for row in scheme.values():
