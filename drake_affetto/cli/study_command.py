@@ -84,8 +84,7 @@ class StudyCommand(Generic[P]):
 
         from rich.console import Console
 
-        self.work(plan, args, Console())
-        return 0
+        return self.work(plan, args, Console()) or 0
 
     def add_options(self, parser: argparse.ArgumentParser) -> None:
         """Declares what options this command has besides."""
@@ -94,8 +93,14 @@ class StudyCommand(Generic[P]):
         """The plan that the options describe."""
         return make_plan(self.plan, args)
 
-    def work(self, plan: P, args: argparse.Namespace, console: Any) -> None:
-        """Runs what is missing, shows the results and writes them."""
+    def work(
+        self, plan: P, args: argparse.Namespace, console: Any
+    ) -> int | None:
+        """Runs what is missing, shows the results and writes them.
+
+        Returns:
+            The exit code, if it is not 0.
+        """
         with self._call(plan, args, console) as call:
             found = self.study(call)
         results = self.finish(call, found)
@@ -103,6 +108,7 @@ class StudyCommand(Generic[P]):
         write_json(path, results)
         self.show(results, console)
         console.print(f"results: {path}")
+        return None
 
     @contextlib.contextmanager
     def _call(

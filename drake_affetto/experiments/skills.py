@@ -24,6 +24,7 @@ from drake_affetto.experiments.trials import (
 )
 from drake_affetto.geometry.region import grid_inside
 from drake_affetto.runner.executor import Key, Spec, TrialExecutor
+from drake_affetto.station.content import Content, scenario_content
 from drake_affetto.station.scenario import Scenario, SkillConfig, load_scenario
 
 if TYPE_CHECKING:
@@ -293,7 +294,12 @@ def fit_scheme(
     scheme = make_scheme(name, source, input_range=loaded.skill.input_range)
     if name == "transfer_default":
         scheme.set_params(
-            mapping=_mapping(scenario, direct, loaded.transfer.mapping),
+            mapping=_mapping(
+                scenario,
+                direct,
+                loaded.transfer.mapping,
+                (scenario_content(scenario), scenario_content(direct)),
+            ),
             residual="smooth" if loaded.transfer.residual else None,
         )
     with warnings.catch_warnings():
@@ -303,8 +309,10 @@ def fit_scheme(
 
 
 @functools.cache
-def _mapping(scenario: str, direct: str, name: str) -> "str | MapFamily":
-    """The family of maps that a scenario names."""
+def _mapping(
+    scenario: str, direct: str, name: str, _: tuple[Content, Content]
+) -> "str | MapFamily":
+    """The family of maps that a scenario of this content names."""
     if name != "optical":
         return name
     from drake_affetto.experiments.view_maps import (

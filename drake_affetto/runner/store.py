@@ -79,9 +79,26 @@ def _object(text: str, where: str) -> dict[str, Any]:
     return plain
 
 
+def _determining(value: Any) -> Any:
+    """`value` without the entries whose names begin with "@"."""
+    if isinstance(value, Mapping):
+        return {
+            name: _determining(each)
+            for name, each in value.items()
+            if not str(name).startswith("@")
+        }
+    if isinstance(value, (list, tuple)):
+        return [_determining(each) for each in value]
+    return value
+
+
 def trial_key(spec: Mapping[str, Any]) -> str:
-    """The key of the trial that `spec` determines."""
-    text = json.dumps(_key_values(spec), sort_keys=True)
+    """The key of the trial that `spec` determines.
+
+    Entries whose names begin with "@", anywhere in it, are kept with the trial
+    but do not determine it: where something was found, for instance.
+    """
+    text = json.dumps(_key_values(_determining(spec)), sort_keys=True)
     return text_digest(text, length=None)
 
 
@@ -333,12 +350,10 @@ class TrialStore:
                 )
             whole, text = found[0]
             where = f"{self.path}: trial {whole}"
-            if text_digest(text, length=None) != whole:
+            stored = _object(text, f"{where}: spec")
+            if trial_key(stored) != whole:
                 raise InputError(f"{where}: its spec is damaged")
-            spec = map_leaves(
-                _object(text, f"{where}: spec"),
-                lambda leaf: self._input(leaf, where),
-            )
+            spec = map_leaves(stored, lambda leaf: self._input(leaf, where))
         except sqlite3.Error as error:
             raise InputError(
                 f"cannot read trials in {self.path}: {error}"

@@ -43,6 +43,7 @@ from drake_affetto.common.errors import (
     require_array,
     require_range,
 )
+from drake_affetto.common.fields import file_name
 from drake_affetto.common.resources import configure_parser, resolve
 from drake_affetto.geometry.kinematics import SerialChain
 from drake_affetto.scene import joints
@@ -106,8 +107,10 @@ class WorldConfig:
             `affetto_base` or `mirror_pose`.
     """
 
-    directives: str = "package://drake_affetto/scenes/drumming.dmd.yaml"
-    drum: str = "package://drake_affetto/sdf/drum.sdf"
+    directives: str = file_name(
+        "package://drake_affetto/scenes/drumming.dmd.yaml"
+    )
+    drum: str = file_name("package://drake_affetto/sdf/drum.sdf")
     drum_position: list[float] = dataclasses.field(
         default_factory=lambda: [0.235, -0.09]
     )

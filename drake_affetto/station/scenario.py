@@ -18,9 +18,11 @@ from drake_affetto.common.errors import (
     require_interval,
     require_range,
 )
-from drake_affetto.common.resources import models_dir
+from drake_affetto.common.fields import file_name
+from drake_affetto.common.fingerprint import config_values
+from drake_affetto.common.resources import models_dir, resolve
 from drake_affetto.common.typing import Array, Mask
-from drake_affetto.common.yaml_config import read_yaml, typed
+from drake_affetto.common.yaml_config import anchored, read_yaml, typed
 from drake_affetto.control.pidf_controller import PidfConfig
 from drake_affetto.geometry.optics import (
     polygon_area,
@@ -51,6 +53,12 @@ LONGEST_STEP = 5e-3
 
 # The smallest region that a drum is put into, m².
 _LEAST_REGION = 1e-4
+
+# The fields that are Drake's own structs.
+_DRAKES: dict[str, Any] = {
+    "simulator_config": SimulatorConfig,
+    "plant_config": MultibodyPlantConfig,
+}
 
 # A file names here the scenario whose values hold where it is silent.
 _EXTENDS = "extends"
@@ -186,13 +194,17 @@ class TransferConfig:
         )
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(eq=False)
 class Scenario:
     """What a station is built from; field names as in Drake's scenarios.
 
+    Two scenarios are equal where all their values are; they can be copied and
+    pickled.
+
     Attributes:
-        random_seed: seed of whatever is random in a simulation.
-        simulation_duration: s, of a trial that nobody stops earlier.
+        random_seed: seed of whatever is random in a simulation that is given
+            none: a station that is served or watched, or taught by mouse.
+            Trials of a study have seeds of their own.
         settling_duration: s, in which the robot comes to rest at its start
             posture before the first trial.
         simulator_config: Drake's own.
@@ -230,7 +242,6 @@ class Scenario:
     """
 
     random_seed: int = 0
-    simulation_duration: float = 8.0
     settling_duration: float = 2.0
     simulator_config: SimulatorConfig = dataclasses.field(
         default_factory=SimulatorConfig
@@ -271,11 +282,11 @@ class Scenario:
     variation: VariationConfig = dataclasses.field(
         default_factory=VariationConfig
     )
-    sound: str = "package://drake_affetto/sound.yaml"
+    sound: str = file_name("package://drake_affetto/sound.yaml")
     teaching: TeacherConfig = dataclasses.field(default_factory=TeacherConfig)
     motion_source: str = "skill"
     valve_source: str = "pidf"
-    wire: str = ""
+    wire: str = file_name("")
     hardware: bool = False
 
     def check(self, where: str = "scenario") -> None:
@@ -285,9 +296,6 @@ class Scenario:
             InputError: naming the first field that does not fit.
         """
         require_range(f"{where}.random_seed", self.random_seed, 0, 2**31 - 1)
-        require_range(
-            f"{where}.simulation_duration", self.simulation_duration, 0, 3600
-        )
         require_range(
             f"{where}.settling_duration", self.settling_duration, 0.1, 60
         )
@@ -323,6 +331,11 @@ class Scenario:
             "'flow' where the valves are controlled by PIDF (Eq. 7)",
         )
         load_sound_config(self.sound)
+        if self.wire:
+            try:
+                resolve(self.wire)
+            except InputError as error:
+                raise InputError(f"{where}.wire: {error}") from None
         for i, mirror in enumerate(self.mirrors):
             mirror.check(f"{where}.mirrors[{i}]")
         for field in dataclasses.fields(self):
@@ -337,6 +350,27 @@ class Scenario:
         )
         # Last: a rate that is no number above 0 is told as such.
         self._check_periods(where)
+
+    # Drake's structs compare by identity and cannot be pickled: their values
+    # stand for them.
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Scenario):
+            return NotImplemented
+        return bool(config_values(self) == config_values(other))
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = dict(vars(self))
+        for name in _DRAKES:
+            state[name] = config_values(state[name])
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        for name, kind in _DRAKES.items():
+            setattr(self, name, kind(**state[name]))
 
     def _check_periods(self, where: str) -> None:
         """Raises InputError for a period that is not a number of steps."""
@@ -375,13 +409,28 @@ def load_scenario(name: str | Path) -> Scenario:
         InputError: if there is no such scenario, it is not YAML, or a field
             is unknown, of the wrong type or out of range.
     """
-    path = _find(name)
-    scenario = _load(path, ())
+    return read_scenario(name)[0]
+
+
+def read_scenario(name: str | Path) -> tuple[Scenario, list[Path]]:
+    """A scenario, and the files that it was read from, its own first.
+
+    Raises:
+        InputError: as `load_scenario`.
+    """
+    path = find_scenario(name)
+    files: list[Path] = []
+    scenario = _load(path, files)
     scenario.check(path.stem)
-    return scenario
+    return scenario, files
 
 
-def _find(name: str | Path) -> Path:
+def find_scenario(name: str | Path) -> Path:
+    """The file of a scenario, see `load_scenario`.
+
+    Raises:
+        InputError: if there is no such scenario.
+    """
     text = str(name)
     if text.endswith((".yaml", ".yml")):
         path = Path(text)
@@ -399,9 +448,11 @@ def _find(name: str | Path) -> Path:
     return path
 
 
-def _load(path: Path, seen: tuple[Path, ...]) -> Scenario:
+def _load(path: Path, files: list[Path]) -> Scenario:
+    """Reads a scenario; adds its file, and those it extends, to `files`."""
+    files.append(path)
     path = path.resolve()
-    if path in seen:
+    if path in (each.resolve() for each in files[:-1]):
         raise InputError(f"{path} extends itself")
     data = read_yaml(path)
     base = data.pop(_EXTENDS, None)
@@ -415,5 +466,6 @@ def _load(path: Path, seen: tuple[Path, ...]) -> Scenario:
         )
         if base.endswith((".yaml", ".yml")):
             base = path.parent / base
-        defaults = _load(_find(base), (*seen, path))
+        defaults = _load(find_scenario(base), files)
+    data = anchored(data, Scenario, path.parent)
     return typed(Scenario, data, where=path.stem, defaults=defaults)

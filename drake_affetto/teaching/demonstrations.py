@@ -7,7 +7,7 @@ and `about`; each demonstration is a group `demonstrations/000000`, ... with
   `task_parameter` (d,), `prototype` (bands, frames) and `drum_xy` (2,), each
   with a checksum and the attributes `unit` and `about`;
 - attributes `joint_names` (n), `attempt`, `teacher`, `scenario`, `version`,
-  and where they exist `seed`, `reward` and `max_pull`, N.
+  `content`, and where they exist `seed`, `reward` and `max_pull`, N.
 
 A demonstration is added to a copy, which then replaces the file. If the
 process is killed at any moment, only the demonstration that it was writing is
@@ -18,6 +18,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import contextlib
 import dataclasses
 import fcntl
+import json
 import os
 from pathlib import Path
 import re
@@ -35,7 +36,7 @@ from drake_affetto.common.errors import (
     require_array,
     require_file,
 )
-from drake_affetto.common.output import atomic_path
+from drake_affetto.common.output import atomic_path, write_target
 from drake_affetto.common.typing import Array
 
 FORMAT = "drake_affetto demonstrations"
@@ -91,6 +92,8 @@ class Demonstration:
         teacher: Kind of teacher: "simulated", "by mouse", or other text.
         scenario: Name of the scenario, or of the log that it comes from.
         version: Version of this package that made it.
+        content: Digests of what made it: the scenario's values and files, see
+            `station.content`. Empty in files of version 0.1.0.
 
     Raises:
         InputError: If arrays do not fit each other, times do not rise, or
@@ -111,6 +114,7 @@ class Demonstration:
     teacher: str = ""
     scenario: str = ""
     version: str = drake_affetto.__version__
+    content: dict[str, str] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self):
         self.joint_names = tuple(str(name) for name in self.joint_names)
@@ -163,19 +167,30 @@ class Demonstration:
         setattr(self, field, require_array(field, value, shape).copy())
 
 
-def append_demonstration(path: str | Path, demonstration: Demonstration) -> int:
+def append_demonstration(
+    path: str | Path,
+    demonstration: Demonstration,
+    expected: int | None = None,
+) -> int:
     """Adds a demonstration to a file; creates the file if there is none.
 
     Several processes may add to one file.
+
+    Args:
+        path: The file.
+        demonstration: What is added.
+        expected: How many demonstrations the file is known to hold; None if
+            it does not matter.
 
     Returns:
         Number of demonstrations that the file holds now.
 
     Raises:
         InputError: If the file is not one of demonstrations, is damaged or
-            cannot be written. Then it is not changed.
+            cannot be written, or holds another number of demonstrations than
+            expected. Then it is not changed.
     """
-    path = Path(path)
+    path = write_target(path)
     with _only_writer(path), atomic_path(path) as fresh:
         if path.exists():
             shutil.copyfile(path, fresh)
@@ -184,7 +199,14 @@ def append_demonstration(path: str | Path, demonstration: Demonstration) -> int:
             try:
                 group = file.require_group("demonstrations")
                 number = len(group)
+                if expected is not None and number != expected:
+                    raise InputError(
+                        f"another process, too, adds to {path}: it holds "
+                        f"{number} demonstrations, expected {expected}"
+                    )
                 _write(group.create_group(f"{number:06d}"), demonstration)
+            except InputError:
+                raise
             except _DAMAGE as error:
                 raise InputError(
                     f"cannot add to {path}: {_short(error)}"
@@ -201,7 +223,7 @@ def write_demonstrations(
     Raises:
         InputError: If it cannot be written.
     """
-    path = Path(path)
+    path = write_target(path)
     with _only_writer(path), atomic_path(path) as fresh:
         with _opened(fresh, "x", path) as file:
             group = file.require_group("demonstrations")
@@ -363,6 +385,8 @@ def _write(group: h5py.Group, demonstration: Demonstration) -> None:
         value = getattr(demonstration, field)
         if value is not None:
             group.attrs[field] = value
+    if demonstration.content:
+        group.attrs["content"] = json.dumps(demonstration.content)
 
 
 def _read(group: h5py.Group) -> Demonstration:
@@ -390,7 +414,14 @@ def _read(group: h5py.Group) -> Demonstration:
         teacher=str(attributes.get("teacher", "")),
         scenario=str(attributes["scenario"]),
         version=str(attributes["version"]),
+        content=_content(attributes.get("content", "{}")),
     )
+
+
+def _content(text: Any) -> dict[str, str]:
+    content = json.loads(str(text))
+    require(isinstance(content, dict), "content", content, "an object")
+    return {str(name): str(each) for name, each in content.items()}
 
 
 @contextlib.contextmanager
