@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 class DrumCommand(StudyCommand[DrumPlan]):
     """Teaches, and tests the skill after each demonstration."""
 
+    command = "drum"
     plan = DrumPlan
     out = "out/drum"
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from drake_affetto.cli.options import add_output_argument
 from drake_affetto.common.errors import InputError
-from drake_affetto.common.output import prepare_output
+from drake_affetto.common.owner import claim_folder
 
 if TYPE_CHECKING:
     from drake_affetto.identification.problem import JointProblem
@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
         supply=supply,
         actuator=supply.classes[joint.actuator],
     )
-    folder = prepare_output(args.out)
+    folder = claim_folder(args.out, "identify")
 
     console = Console()
     _print_notes(problem, fit, test)

@@ -9,7 +9,7 @@ from drake_affetto.cli.options import (
     add_seed_argument,
 )
 from drake_affetto.common.errors import require_range
-from drake_affetto.common.output import prepare_output
+from drake_affetto.common.owner import claim_folder
 
 if TYPE_CHECKING:
     from pydrake.systems.framework import Context
@@ -67,7 +67,6 @@ def run(args: argparse.Namespace) -> int:
         sight = make_gaze_geometry(station, station.CreateDefaultContext())
         print(calibration_yaml(sight.calibration()))
         return 0
-    out = prepare_output(args.out)
     station = AffettoStation(scenario)
     context = station.CreateDefaultContext()
     xy = np.array(args.drum or scenario.drum_region.middle)
@@ -77,6 +76,7 @@ def run(args: argparse.Namespace) -> int:
     )
     sight = make_gaze_geometry(station, context)
     yaw = sight.looking_yaw(xy)
+    out = claim_folder(args.out, "look")
     for name, angle in (("start", None), ("look", yaw)):
         if angle is not None:
             turn_to(station, context, angle)

@@ -6,8 +6,10 @@ Each sub-command lives in a module that offers
     run(args) -> int       the work, and the exit code
 
 and only the module of the command asked for is imported, so `affetto --help`
-is instant. Exit codes: 0 done, 1 nothing came of it, 2 the user's input does not fit (one
-line on stderr), 130 interrupted, 141 the reader of a pipe went away.
+is instant. Exit codes: 0 done, 1 nothing came of it, 2 the user's input does
+not fit (one line on stderr), 128 + N ended by signal N: 130 interrupted
+(Ctrl-C), 143 terminated, 129 the terminal was closed, 141 the reader of a pipe
+went away.
 """
 
 import argparse

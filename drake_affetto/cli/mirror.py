@@ -19,6 +19,7 @@ Outcomes = dict[str, "MirrorOutcome"]
 class MirrorCommand(StudyCommand[MirrorPlan]):
     """Compares schemes of transfer, in one changed view or in all."""
 
+    command = "mirror"
     plan = MirrorPlan
     out = "out/mirror"
 

@@ -20,7 +20,8 @@ from drake_affetto.cli.options import (
     make_plan,
     worker_count,
 )
-from drake_affetto.common.output import prepare_output, write_json
+from drake_affetto.common.output import write_json
+from drake_affetto.common.owner import claim_folder
 from drake_affetto.experiments.plans import Plan
 
 if TYPE_CHECKING:
@@ -53,12 +54,14 @@ class StudyCommand(Generic[P]):
     """A command that runs trials by a plan, and writes results.json.
 
     Attributes:
+        command: Its name.
         plan: Dataclass of the plan; its fields are options.
         out: Default folder of the results; None where the command declares
             --out itself.
         trials: Word for what the study's executor runs.
     """
 
+    command: str
     plan: type[P]
     out: str | None = None
     trials = "trials"
@@ -128,7 +131,7 @@ class StudyCommand(Generic[P]):
 
                     for scenario in scenarios:
                         load_scenario(scenario)
-                out = prepare_output(args.out)
+                out = claim_folder(args.out, self.command)
             with trial_executor(
                 args, out / STORE, console, pool, run, self.trials
             ) as executor:

@@ -13,7 +13,7 @@ from drake_affetto.cli.study_command import (
 )
 from drake_affetto.common.errors import require
 from drake_affetto.common.folder_lock import lock_file
-from drake_affetto.common.output import prepare_output, write_target
+from drake_affetto.common.owner import claim_file
 from drake_affetto.experiments.plans import TeachPlan
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 class TeachCommand(StudyCommand[TeachPlan]):
     """Adds demonstrations to a file, of a simulated teacher or a person."""
 
+    command = "teach"
     plan = TeachPlan
 
     def add_options(self, parser: argparse.ArgumentParser) -> None:
@@ -98,11 +99,14 @@ def demonstrations_file(out: str) -> Path:
     Raises:
         InputError: If it is a folder, or its folder cannot be written.
     """
-    path = Path(out).expanduser()
     require(bool(out), "--out", out, "the name of a file")
-    require(not path.is_dir(), "--out", out, "a file, not a folder")
-    prepare_output(write_target(path).parent)
-    return path
+    require(
+        not Path(out).expanduser().is_dir(),
+        "--out",
+        out,
+        "a file, not a folder",
+    )
+    return claim_file(out, "teach")
 
 
 def print_outcomes(

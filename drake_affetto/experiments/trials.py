@@ -315,7 +315,8 @@ def run_trials(
     """
 
     def typed(key: Key, result: Result) -> Any:
-        return unpack(specs[key]["kind"], *result)
+        spec = specs[key]
+        return unpack(spec["kind"], *result, executor.where(spec))
 
     def report(key: Key, result: Result) -> None:
         if on_result is not None:
