@@ -60,7 +60,20 @@ ROBOT_LOG_JOINTS = (
 """The joints of the 13-DOF robot in the order of its logs: q0, q1, ..."""
 
 # What h5py raises for a damaged file.
-_DAMAGE = (KeyError, OSError, RuntimeError, TypeError, ValueError)
+_DAMAGE = (
+    AttributeError,
+    KeyError,
+    MemoryError,
+    OSError,
+    OverflowError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
+
+# By how much an array in a file can be greater than what is stored of it.
+_GREATEST_RATIO = 1100
+_SMALL = 4096
 
 # Unit and meaning of each array of `Demonstration`, as written to the file.
 _ARRAYS = {
@@ -251,7 +264,13 @@ def read_demonstrations(path: str | Path) -> list[Demonstration]:
         try:
             demonstrations = []
             group = file["demonstrations"]
-            for name in sorted(group):
+            for number, name in enumerate(sorted(group)):
+                require(
+                    name == f"{number:06d}",
+                    f"demonstration {number:06d}",
+                    "missing",
+                    f"all numbers up to {len(group) - 1:06d}",
+                )
                 where = f"{path}: demonstration {name}"
                 demonstrations.append(_read(group[name]))
             return demonstrations
@@ -391,7 +410,8 @@ def _write(group: h5py.Group, demonstration: Demonstration) -> None:
 
 def _read(group: h5py.Group) -> Demonstration:
     arrays: dict[str, Any] = {
-        field: group[field][()] if field in group else None for field in _ARRAYS
+        field: _array(group, field) if field in group else None
+        for field in _ARRAYS
     }
     attributes = group.attrs
     names = [
@@ -416,6 +436,23 @@ def _read(group: h5py.Group) -> Demonstration:
         version=str(attributes["version"]),
         content=_content(attributes.get("content", "{}")),
     )
+
+
+def _array(group: h5py.Group, field: str) -> Any:
+    """A dataset's content; not if it declares what it cannot hold."""
+    dataset = group[field]
+    require(
+        isinstance(dataset, h5py.Dataset), field, type(dataset), "a dataset"
+    )
+    size = dataset.size * dataset.dtype.itemsize if dataset.shape else 0
+    room = _GREATEST_RATIO * dataset.id.get_storage_size() + _SMALL
+    require(
+        size <= room,
+        field,
+        f"an array of shape {dataset.shape}",
+        f"at most {room} bytes, by what is stored of it",
+    )
+    return dataset[()]
 
 
 def _content(text: Any) -> dict[str, str]:
