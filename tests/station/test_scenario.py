@@ -5,11 +5,19 @@ import dataclasses
 import pickle
 import re
 import shutil
+import sys
+import typing
 
+import numpy as np
 import pytest
 
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.resources import models_dir
+from drake_affetto.experiments.episode import TrialRunner
+from drake_affetto.experiments.skills import fit_scheme, make_skill
+from drake_affetto.experiments.trials import draw_positions
+from drake_affetto.motion import Dmp, DmpConfig
+from drake_affetto.robot.simulated_robot import check_served
 from drake_affetto.robot.wire import load_wire
 from drake_affetto.station.scenario import (
     Scenario,
@@ -225,3 +233,73 @@ def test_a_scenario_is_copied_pickled_and_compared(name):
         assert other != scenario
         assert pickle.loads(pickle.dumps(other)) == other
     assert load_scenario("easy_drumming") != load_scenario("drumming")
+
+
+def schemas(schema, found):
+    """All dataclasses of a scenario."""
+    if schema in found or not dataclasses.is_dataclass(schema):
+        return
+    found.add(schema)
+    waiting = list(typing.get_type_hints(schema).values())
+    while waiting:
+        kind = waiting.pop()
+        waiting += typing.get_args(kind)
+        if isinstance(kind, type):
+            schemas(kind, found)
+
+
+@pytest.mark.slow
+def test_every_field_is_read_by_what_it_configures(monkeypatch, tmp_path):
+    """By more than its own check: a field without effect goes."""
+    found = set()
+    schemas(Scenario, found)
+    read = set()
+    passing = ("dataclasses.py", "fields.py", "fingerprint.py", "copy.py")
+
+    def watch(schema):
+        own = {field.name for field in dataclasses.fields(schema)}
+
+        def get(self, name):
+            caller = sys._getframe(1).f_code
+            if (
+                name in own
+                and caller.co_name not in ("check", "_check_periods")
+                and not caller.co_filename.endswith(passing)
+            ):
+                read.add(f"{schema.__name__}.{name}")
+            return object.__getattribute__(self, name)
+
+        monkeypatch.setattr(schema, "__getattribute__", get)
+
+    for schema in found:
+        watch(schema)
+    fisheye = tmp_path / "fisheye.yaml"
+    fisheye.write_text("extends: mirror\ncamera: {lens: {k1: 0.05}}\n")
+    xy = np.array([0.235, -0.09])
+    runner = TrialRunner(load_scenario("drumming"))
+    runner.gaze(xy, 1)
+    # Out of sight: it searches, and loses what it has seen.
+    runner.gaze(np.array([0.36, 0.1]), 2)
+    theta = runner.teach(xy, 1).theta
+    runner.strike(xy, theta, 1)
+    TrialRunner(load_scenario(fisheye)).gaze(xy, 1)
+    easy = load_scenario("easy_drumming")
+    draw_positions(easy, 2, np.random.default_rng(0))
+    t = np.linspace(0.0, 3.0, 50)
+    Dmp(DmpConfig(method="forcing")).encode(t, np.sin(t)[:, None])
+    skill = make_skill(easy.skill, 0).fit(np.eye(2), np.eye(2))
+    fit_scheme(
+        "transfer_default", skill, np.eye(2), np.eye(2), "mirror", "drumming"
+    )
+    robot = load_scenario("robot")
+    robot.hardware = True
+    with pytest.raises(InputError, match="hardware is True"):
+        check_served(robot, 200.0)
+    robot.hardware = False
+    check_served(robot, 200.0)
+    every = {
+        f"{schema.__name__}.{field.name}"
+        for schema in found
+        for field in dataclasses.fields(schema)
+    }
+    assert sorted(every - read) == []
