@@ -11,7 +11,7 @@ from drake_affetto.cli.study_command import (
     tells_how_to_continue,
     worker_pool,
 )
-from drake_affetto.common.output import prepare_output
+from drake_affetto.common.owner import claim_folder
 from drake_affetto.experiments.plans import DemoPlan
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 class DemoCommand(StudyCommand[DemoPlan]):
     """Runs a small drum and a small mirror study, and shows them on a page."""
 
+    command = "demo"
     plan = DemoPlan
     out = "out/demo"
 
@@ -37,7 +38,7 @@ class DemoCommand(StudyCommand[DemoPlan]):
         self, plan: DemoPlan, args: argparse.Namespace, console: Any
     ) -> None:
         """Runs the demo and writes its page."""
-        out = prepare_output(args.out)
+        out = claim_folder(args.out, self.command)
         with contextlib.ExitStack() as stack:
             stack.enter_context(tells_how_to_continue(console, out))
             pool = None

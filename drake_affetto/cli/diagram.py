@@ -5,7 +5,7 @@ from pathlib import Path
 
 from drake_affetto.cli.options import add_scenario_argument, whole_number
 from drake_affetto.common.errors import require
-from drake_affetto.common.output import prepare_output
+from drake_affetto.common.owner import claim_file
 from drake_affetto.station.diagram_drawing import check_suffix, write_diagram
 
 
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from drake_affetto.station.station import AffettoStation
 
     scenario = load_scenario(args.scenario)
-    prepare_output(path.parent)
+    claim_file(path, "diagram")
     station = AffettoStation(scenario)
     write_diagram(station, path, args.depth, all_ports=args.all_ports)
     print(path)

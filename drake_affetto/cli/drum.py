@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 class DrumCommand(StudyCommand[DrumPlan]):
     """Teaches, and tests the skill after each demonstration."""
 
+    command = "drum"
     plan = DrumPlan
     out = "out/drum"
 
@@ -26,7 +27,7 @@ class DrumCommand(StudyCommand[DrumPlan]):
         """Runs the study."""
         from drake_affetto.experiments.drumming import run_drum
 
-        return run_drum(call.executor, call.plan)
+        return run_drum(call.executor, call.plan, call.out)
 
     def show(self, results: "DrumResults", console: Any) -> None:
         """Prints success over demonstrations, and how good the reward is."""

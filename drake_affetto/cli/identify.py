@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from drake_affetto.cli.options import add_output_argument, whole_number
 from drake_affetto.common.errors import InputError
-from drake_affetto.common.output import prepare_output
+from drake_affetto.common.owner import claim_folder
 
 if TYPE_CHECKING:
     from drake_affetto.identification.problem import JointProblem
@@ -73,10 +73,9 @@ def run(args: argparse.Namespace) -> int:
     # Everything is read and checked before the folder is made.
     controller = load_robot_controller()
     joint = require_joint(controller, args.joint)
+    require_distinct(args.fit, args.test)
     fit = [read_log(path, args.joint, controller) for path in args.fit]
     test = [read_log(path, args.joint, controller) for path in args.test]
-    _require_distinct(args.fit, "--fit")
-    _require_distinct(args.test, "--test")
     supply = load_parameters(overlays=args.overlay)
     problem = JointProblem(
         joint=joint,
@@ -84,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
         supply=supply,
         actuator=supply.classes[joint.actuator],
     )
-    folder = prepare_output(args.out)
+    folder = claim_folder(args.out, "identify")
 
     console = Console()
     _print_notes(problem, fit, test)
@@ -95,15 +94,37 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _require_distinct(paths: Sequence[str], option: str) -> None:
-    """Raises InputError if two logs have the same name."""
-    stems = [Path(path).stem for path in paths]
-    for stem in stems:
-        if stems.count(stem) > 1:
-            raise InputError(
-                f"{option}: two logs are called {stem}; their results would "
-                "overwrite each other"
-            )
+def require_distinct(fit: Sequence[str], test: Sequence[str]) -> None:
+    """Sees that each log is given once, and what is tested was not fitted.
+
+    Raises:
+        InputError: If two logs have one name or one content, or a file cannot
+            be read.
+    """
+    names: dict[str, str] = {}
+    contents: dict[bytes, str] = {}
+    for option, paths in (("--fit", fit), ("--test", test)):
+        for path in paths:
+            stem = Path(path).stem
+            try:
+                content = Path(path).read_bytes()
+            except OSError as error:
+                raise InputError(
+                    f"{option}: cannot read {path}: {error.strerror}"
+                ) from error
+            if content in contents:
+                raise InputError(
+                    f"{option}: {path} is the same log as "
+                    f"{contents[content]}; a log that was fitted is not held "
+                    "out, and none counts twice"
+                )
+            if stem in names:
+                raise InputError(
+                    f"{option}: two logs are called {stem}; their results "
+                    "would overwrite each other"
+                )
+            names[stem] = path
+            contents[content] = path
 
 
 def _print_notes(
@@ -122,9 +143,6 @@ def _print_notes(
                 f"robot's PID law (rms difference {error:.1f} kPa); expect "
                 "little of its closed loop"
             )
-    both = {log.name for log in fit} & {log.name for log in test}
-    if both:
-        print(f"note: fitted and tested on: {', '.join(sorted(both))}")
 
 
 def _print_errors(results: dict[str, Any], console: Any) -> None:

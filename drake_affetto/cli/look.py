@@ -10,7 +10,7 @@ from drake_affetto.cli.options import (
     real_number,
 )
 from drake_affetto.common.errors import require_range
-from drake_affetto.common.output import prepare_output
+from drake_affetto.common.owner import claim_folder
 
 if TYPE_CHECKING:
     from pydrake.systems.framework import Context
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
     sight = make_gaze_geometry(station, context)
     yaw = sight.looking_yaw(xy)
     # Nothing is written for a drum that cannot be looked at.
-    out = prepare_output(args.out)
+    out = claim_folder(args.out, "look")
     for name, angle in (("start", None), ("look", yaw)):
         if angle is not None:
             turn_to(station, context, angle)

@@ -6,16 +6,22 @@ Each sub-command lives in a module that offers
     run(args) -> int       the work, and the exit code
 
 and only the module of the command asked for is imported, so `affetto --help`
-is instant. Exit codes: 0 done, 2 the user's input does not fit (one line on
-stderr), 130 interrupted, 141 the reader of a pipe went away.
+is instant. Exit codes: 0 done, 1 nothing came of it, 2 the user's input does
+not fit (one line on stderr), 128 + N ended by signal N: 130 interrupted
+(Ctrl-C), 143 terminated, 129 the terminal was closed, 141 the reader of a pipe
+went away. 1 is also that of an output which cannot be written.
 """
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+import contextlib
+import errno
 import importlib
 import os
 import re
+import signal
 import sys
+import threading
 from typing import Any, NoReturn
 
 from drake_affetto import __version__
@@ -47,13 +53,25 @@ _PROGRAM = "affetto"
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
+# Why an output takes no more.
+_FULL = (errno.EBADF, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.ENOSPC)
+
+
 class _Parser(argparse.ArgumentParser):
-    """argparse, but an error is one line, and -9e-2 is a number."""
+    """argparse, but an error is one line, and -9e-2 is a number.
+
+    Help that cannot be written is an error too.
+    """
 
     def __init__(self, *args: Any, **kwargs: Any):
         super().__init__(*args, **kwargs)
         # argparse takes words like these for options otherwise.
         self._negative_number_matcher = _NEGATIVE_NUMBER
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        # argparse's own hides that nothing was written.
+        if message:
+            (file or sys.stderr).write(message)
 
     def error(self, message: str) -> NoReturn:
         print(
@@ -107,6 +125,76 @@ def make_parser(command: str | None = None) -> argparse.ArgumentParser:
     return parser
 
 
+class Ended(KeyboardInterrupt):
+    """A signal ends the command: what is open is closed, as on Ctrl-C."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self.number = number
+
+
+# What ends a command besides Ctrl-C, and what is said then.
+_ENDINGS = {"SIGTERM": "terminated", "SIGHUP": "the terminal was closed"}
+
+
+@contextlib.contextmanager
+def _ends_by_signal() -> Iterator[None]:
+    """Lets signals end the block by an exception; a second one by force."""
+    before: dict[int, Any] = {}
+
+    def end(number: int, _: object) -> None:
+        signal.signal(number, signal.SIG_DFL)
+        raise Ended(number)
+
+    for name in _ENDINGS:
+        number = getattr(signal, name, None)
+        # Elsewhere than in the main thread nobody may; nohup has its reason.
+        if (
+            number is not None
+            and threading.current_thread() is threading.main_thread()
+            and signal.getsignal(number) is signal.SIG_DFL
+        ):
+            before[number] = signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _open_streams() -> None:
+    """Sees that files which are opened later are not taken for a stream.
+
+    Raises:
+        OSError: If the standard output is closed.
+    """
+    closed = sys.stdout is None
+    for number, name in ((0, "stdin"), (1, "stdout"), (2, "stderr")):
+        if getattr(sys, name) is None:
+            mode = "r" if number == 0 else "w"
+            with contextlib.suppress(OSError):
+                os.dup2(os.open(os.devnull, os.O_RDWR), number)
+                stream = open(number, mode, closefd=False)  # noqa: SIM115
+                setattr(sys, name, stream)
+    if closed:
+        raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+
+
+def _say(message: str) -> None:
+    """One line on stderr, if anybody can read it."""
+    with contextlib.suppress(OSError, ValueError):
+        print(f"{_PROGRAM}: {message}", file=sys.stderr, flush=True)
+
+
+def _drop_output() -> None:
+    """Gives what is left in the buffer to nobody.
+
+    Without it the interpreter complains of it on its way out.
+    """
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command in `argv` (sys.argv[1:]) and returns its exit code."""
     argv = sys.argv[1:] if argv is None else argv
@@ -114,21 +202,40 @@ def main(argv: Sequence[str] | None = None) -> int:
         # Before numpy is imported, which reads it then.
         os.environ.setdefault(name, "1")
     try:
+        _open_streams()
+        with _ends_by_signal():
+            return _run(argv)
+    except InputError as error:
+        _say(f"error: {_one_line(error)}")
+        return 2
+    except Ended as ending:
+        _drop_output()
+        _say(_ENDINGS[signal.Signals(ending.number).name])
+        return 128 + ending.number
+    except KeyboardInterrupt:
+        _say("interrupted")
+        return 130
+    except BrokenPipeError:
+        _drop_output()
+        return 141
+    except OSError as error:
+        # Of files, errors are told by those who write them, as InputError.
+        if error.filename is not None or error.errno not in _FULL:
+            raise
+        _drop_output()
+        _say(f"error: cannot write the output: {error.strerror}")
+        return 1
+
+
+def _run(argv: Sequence[str]) -> int:
+    try:
         try:
             args = make_parser(_chosen(argv)).parse_args(argv)
             return int(args.run(args) or 0)
         finally:
             sys.stdout.flush()
     except SystemExit as leaving:  # argparse, after --help or an error
+        if isinstance(leaving.__context__, BrokenPipeError):
+            # So does rich, which has no other word for it.
+            raise BrokenPipeError from leaving
         return leaving.code if isinstance(leaving.code, int) else 1
-    except InputError as error:
-        print(f"{_PROGRAM}: error: {_one_line(error)}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print(f"{_PROGRAM}: interrupted", file=sys.stderr)
-        return 130
-    except BrokenPipeError:
-        # What is left in the buffer has no reader: give it to nobody, or the
-        # interpreter complains of it on its way out.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 141

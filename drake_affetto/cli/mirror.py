@@ -28,6 +28,7 @@ def _views(plan: MirrorPlan, args: argparse.Namespace) -> list[str]:
 class MirrorCommand(StudyCommand[MirrorPlan]):
     """Compares schemes of transfer, in one changed view or in all."""
 
+    command = "mirror"
     plan = MirrorPlan
     out = "out/mirror"
 
@@ -74,7 +75,9 @@ class MirrorCommand(StudyCommand[MirrorPlan]):
         found = {}
         for name in _views(plan, call.args):
             found[name] = run_mirror(
-                call.executor, dataclasses.replace(plan, scenario=name)
+                call.executor,
+                dataclasses.replace(plan, scenario=name),
+                call.out,
             )
             _print(found[name].results, call.console)
         return found
@@ -100,7 +103,7 @@ def _record(out: Path, outcome: "MirrorOutcome", plan: MirrorPlan) -> None:
     from drake_affetto.station.scenario import load_scenario
 
     xy = outcome.positions[0]
-    direct, changed = map(load_scenario, (plan.direct, plan.scenario))
+    direct, changed = map(load_scenario, outcome.scenarios)
     scheme = outcome.schemes["transfer_default"]
     write_media(
         out,

@@ -15,6 +15,7 @@ from drake_affetto.cli.options import (
     whole_number,
 )
 from drake_affetto.common.errors import require_range
+from drake_affetto.common.owner import claim_file
 
 if TYPE_CHECKING:
     from drake_affetto.robot.server import RobotServer
@@ -120,7 +121,9 @@ def run(args: argparse.Namespace) -> int:
         recording = None
         if args.record is not None:
             recording = stack.enter_context(
-                WireRecording(args.record, codec.num_joints)
+                WireRecording(
+                    claim_file(args.record, "serve"), codec.num_joints
+                )
             )
         robot = SimulatedRobot(scenario, args.rate, meshcat)
         # Warm by now: from the first packet on time is real time.

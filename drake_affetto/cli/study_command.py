@@ -20,7 +20,8 @@ from drake_affetto.cli.options import (
     make_plan,
     worker_count,
 )
-from drake_affetto.common.output import prepare_output, write_json
+from drake_affetto.common.output import write_json
+from drake_affetto.common.owner import claim_folder
 from drake_affetto.experiments.plans import Plan
 
 if TYPE_CHECKING:
@@ -53,12 +54,14 @@ class StudyCommand(Generic[P]):
     """A command that runs trials by a plan, and writes results.json.
 
     Attributes:
+        command: Its name.
         plan: Dataclass of the plan; its fields are options.
         out: Default folder of the results; None where the command declares
             --out itself.
         trials: Word for what the study's executor runs.
     """
 
+    command: str
     plan: type[P]
     out: str | None = None
     trials = "trials"
@@ -84,8 +87,7 @@ class StudyCommand(Generic[P]):
 
         from rich.console import Console
 
-        self.work(plan, args, Console())
-        return 0
+        return self.work(plan, args, Console()) or 0
 
     def add_options(self, parser: argparse.ArgumentParser) -> None:
         """Declares what options this command has besides."""
@@ -94,8 +96,14 @@ class StudyCommand(Generic[P]):
         """The plan that the options describe."""
         return make_plan(self.plan, args)
 
-    def work(self, plan: P, args: argparse.Namespace, console: Any) -> None:
-        """Runs what is missing, shows the results and writes them."""
+    def work(
+        self, plan: P, args: argparse.Namespace, console: Any
+    ) -> int | None:
+        """Runs what is missing, shows the results and writes them.
+
+        Returns:
+            The exit code, if it is not 0.
+        """
         with self._call(plan, args, console) as call:
             found = self.study(call)
         results = self.finish(call, found)
@@ -103,6 +111,7 @@ class StudyCommand(Generic[P]):
         write_json(path, results)
         self.show(results, console)
         console.print(f"results: {path}")
+        return None
 
     @contextlib.contextmanager
     def _call(
@@ -122,7 +131,7 @@ class StudyCommand(Generic[P]):
 
                     for scenario in scenarios:
                         load_scenario(scenario)
-                out = prepare_output(args.out)
+                out = claim_folder(args.out, self.command)
             with trial_executor(
                 args, out / STORE, console, pool, run, self.trials
             ) as executor:

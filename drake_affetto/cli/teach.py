@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drake_affetto.cli.options import add_renamed_flag
@@ -10,6 +11,9 @@ from drake_affetto.cli.study_command import (
     trial_executor,
     worker_pool,
 )
+from drake_affetto.common.errors import require
+from drake_affetto.common.folder_lock import lock_file
+from drake_affetto.common.owner import claim_file
 from drake_affetto.experiments.plans import TeachPlan
 
 if TYPE_CHECKING:
@@ -19,6 +23,7 @@ if TYPE_CHECKING:
 class TeachCommand(StudyCommand[TeachPlan]):
     """Adds demonstrations to a file, of a simulated teacher or a person."""
 
+    command = "teach"
     plan = TeachPlan
 
     def add_options(self, parser: argparse.ArgumentParser) -> None:
@@ -38,12 +43,24 @@ class TeachCommand(StudyCommand[TeachPlan]):
 
     def work(
         self, plan: TeachPlan, args: argparse.Namespace, console: Any
-    ) -> None:
+    ) -> int:
         """Teaches at the positions that the file does not have."""
+        # Before the imports: the second of two commands is told at once.
+        path = demonstrations_file(args.out)
+        with lock_file(path, "affetto teach"):
+            return self._teach(plan, path, args, console)
+
+    def _teach(
+        self,
+        plan: TeachPlan,
+        path: Path,
+        args: argparse.Namespace,
+        console: Any,
+    ) -> int:
         from drake_affetto.experiments.teaching import teach
         from drake_affetto.experiments.teaching_session import TeachingSession
 
-        session = TeachingSession(plan, args.out)
+        session = TeachingSession(plan, path)
         try:
             if args.mouse:
                 from drake_affetto.experiments.mouse_teaching import (
@@ -67,9 +84,29 @@ class TeachCommand(StudyCommand[TeachPlan]):
             )
             raise
         print_outcomes(outcomes, console)
+        if not session.taught:
+            console.print("Nothing was taught, and no file was written.")
+            return 1
         console.print(
             f"{len(session.taught)} demonstrations are in {session.path}"
         )
+        return 0
+
+
+def demonstrations_file(out: str) -> Path:
+    """The file that --out names, in a folder that is made if need be.
+
+    Raises:
+        InputError: If it is a folder, or its folder cannot be written.
+    """
+    require(bool(out), "--out", out, "the name of a file")
+    require(
+        not Path(out).expanduser().is_dir(),
+        "--out",
+        out,
+        "a file, not a folder",
+    )
+    return claim_file(out, "teach")
 
 
 def print_outcomes(

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 class ToyCommand(StudyCommand[ToyPlan]):
     """Transfers a function of two inputs, without the robot."""
 
+    command = "toy"
     plan = ToyPlan
     out = "out/toy"
     trials = "seeds"

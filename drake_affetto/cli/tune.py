@@ -13,7 +13,7 @@ from drake_affetto.cli.options import (
 )
 from drake_affetto.cli.study_command import tells_how_to_continue
 from drake_affetto.common.errors import require_range
-from drake_affetto.common.output import prepare_output
+from drake_affetto.common.owner import claim_folder
 from drake_affetto.tuning.config import (
     DEFAULT_FILE,
     HELD_OUT,
@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
         start=args.start,
         tuning=args.tuning,
     )
-    out = prepare_output(args.out)
+    out = claim_folder(args.out, "tune")
     console = Console()
     with tells_how_to_continue(console, out):
         results = run_tune(

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 import math
 from pathlib import Path
+import reprlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -33,6 +34,21 @@ def require(condition: bool, field: str, value: Any, expected: str) -> None:
     """Raises InputError naming `field`, `value` and what was `expected`."""
     if not condition:
         raise InputError(f"{field} is {shown(value)}, expected {expected}")
+
+
+class _Short:
+    """Looks like a value, but not longer than a line."""
+
+    def __init__(self, value: Any) -> None:
+        self._text = reprlib.repr(value)
+
+    def __repr__(self) -> str:
+        return self._text
+
+
+def short(value: Any) -> Any:
+    """What stands in errors for a value that may be a whole file."""
+    return _Short(value)
 
 
 def require_range(

@@ -39,6 +39,16 @@ def number(
     )
 
 
+def file_name(default: str) -> Any:
+    """A field that names a file; see `yaml_config` for relative names."""
+    return dataclasses.field(default=default, metadata={"file": True})
+
+
+def file_names() -> Any:
+    """A field that holds a list of files, none by default."""
+    return dataclasses.field(default_factory=list, metadata={"file": True})
+
+
 def option(
     default: Any,
     help: str,

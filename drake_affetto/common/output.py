@@ -58,18 +58,25 @@ def prepare_output(path: str | Path) -> Path:
     return folder
 
 
+def write_target(path: str | Path) -> Path:
+    """The file that is written where `path` is: a symbolic link's target."""
+    path = Path(path)
+    return Path(os.path.realpath(path)) if path.is_symlink() else path
+
+
 @contextlib.contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
     """A path to write to, which becomes `path` where the block succeeds.
 
     It stands in the folder of `path`, has its suffix (many writers go by that)
-    and is removed where the block fails; `path` then stays as it was.
+    and is removed where the block fails; `path` then stays as it was. Where
+    `path` is a symbolic link, its target is written.
 
     Raises:
         InputError: for an operating system's error, in the block or in the
             renaming: no such folder, no permission, a full disk.
     """
-    path = Path(path)
+    path = write_target(path)
     fresh = _sibling(path)
     try:
         yield fresh

@@ -3,7 +3,9 @@
 Importing this module costs nothing; only `package_map` imports Drake.
 """
 
+import os
 from pathlib import Path
+from typing import Any
 
 from drake_affetto.common.errors import InputError
 
@@ -40,6 +42,26 @@ def resolve(uri: str | Path) -> Path:
     if not path.is_file():
         raise InputError(f"no such file: {text}")
     return path
+
+
+def is_file_name(text: Any) -> bool:
+    """Whether `text` is a package:// URI or an absolute path."""
+    return isinstance(text, str) and (
+        text.startswith(_PACKAGE) or os.path.isabs(text)
+    )
+
+
+def anchor(name: Any, folder: Path) -> Any:
+    """The file `name` as seen from `folder`.
+
+    Args:
+        name: A path, which is relative to `folder` unless it is absolute.
+            Whatever has a scheme (package://), is empty or is no text stays.
+        folder: A folder.
+    """
+    if not isinstance(name, str) or not name or "://" in name:
+        return name
+    return str(Path(os.path.abspath(folder)) / name)
 
 
 def configure_parser(parser) -> None:

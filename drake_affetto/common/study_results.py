@@ -5,6 +5,9 @@ from typing import Any, ClassVar, Self
 
 from drake_affetto import __version__
 
+# What a field that counts accepts, see `typed_json`.
+COUNT = {"range": (0, 10**9)}
+
 
 @dataclasses.dataclass(frozen=True)
 class StudyResults:

@@ -6,6 +6,10 @@ its metadata may narrow that:
     field(metadata={"range": (0.0, 1.0)})   bounds of a number, or of each in
                                             a list or mapping of numbers
     field(metadata={"not_empty": True})     a list or mapping with content
+    field(metadata={"length": 2})           a list of so many
+
+No number is beyond ±1e100: results are measured and summed, and no sum of them
+overflows.
 
 A field with a default may be missing in the JSON (files of earlier versions).
 Keys without a field are ignored (files of later versions).
@@ -25,6 +29,9 @@ from drake_affetto.common.errors import InputError
 from drake_affetto.common.nested import map_leaves
 
 T = TypeVar("T")
+
+# No number in results is greater.
+_GREATEST = 1e100
 
 _NAMES: dict[type, str] = {
     float: "a number",
@@ -55,19 +62,25 @@ def to_plain(value: Any) -> Any:
     return map_leaves(value, leaf)
 
 
-def from_plain(kind: type[T], value: Any, where: str = "") -> T:
+def from_plain(
+    kind: type[T],
+    value: Any,
+    where: str = "",
+    limits: Mapping[str, Any] | None = None,
+) -> T:
     """Reads what `to_plain` has written.
 
     Args:
         kind: The dataclass, or any annotation of a dataclass's field.
         value: The plain data, such as `json.loads` gives.
         where: Name of the value in error messages, e.g. "results.json: ".
+        limits: What metadata of a field narrows it, where `kind` is a field's.
 
     Raises:
         InputError: If `value` does not fit `kind`. The one line names the
             place, the value and what was expected.
     """
-    return _read(kind, value, where, {})
+    return _read(kind, value, where, limits or {})
 
 
 def _read(kind: Any, value: Any, where: str, limits: Mapping[str, Any]) -> Any:
@@ -162,8 +175,10 @@ def _read_scalar(
     if bounds is not None:
         expected += f" from {bounds[0]:g} to {bounds[1]:g}"
         fits = fits and bounds[0] <= value <= bounds[1]
-    if kind is float:
-        fits = fits and math.isfinite(value)
+    if kind in (int, float):
+        fits = fits and math.isfinite(value) and abs(value) <= _GREATEST
+        if bounds is None and isinstance(value, (int, float)) and not fits:
+            expected += f" from {-_GREATEST:g} to {_GREATEST:g}"
     _need(fits, where, value, expected)
     # A whole number stays one: it is written again as it was read.
     return value
@@ -175,7 +190,11 @@ def _check_content(
     """Checks that something is there; gives the limits of what is inside."""
     if limits.get("not_empty") and not value:
         raise InputError(f"{where} is empty")
-    return {k: v for k, v in limits.items() if k != "not_empty"}
+    length = limits.get("length")
+    if length is not None:
+        _need(len(value) == length, where, value, f"{length} values")
+    inner = {"not_empty", "length"}
+    return {k: v for k, v in limits.items() if k not in inner}
 
 
 def _need(condition: bool, where: str, value: Any, expected: str) -> None:

@@ -1,4 +1,8 @@
-"""Reads typed YAML, and says in one line what in it does not fit."""
+"""Reads typed YAML, and says in one line what in it does not fit.
+
+Names of files in it (fields of `fields.file_name`) are relative to the file
+that holds them, wherever the program was started.
+"""
 
 from collections.abc import Mapping, Sequence
 import copy
@@ -14,7 +18,7 @@ from pydrake.common.yaml import yaml_load_typed
 import yaml
 
 from drake_affetto.common.errors import InputError, shown
-from drake_affetto.common.resources import resolve
+from drake_affetto.common.resources import anchor, resolve
 from drake_affetto.common.strict_yaml import parse_yaml, read_text
 
 
@@ -43,6 +47,34 @@ def read_yaml(path: Path) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise InputError(f"{path} holds no mapping at its top")
     return data
+
+
+def anchored(data: Any, schema: Any, folder: Path) -> Any:
+    """`data` with the relative names of files in it made absolute.
+
+    Args:
+        data: What a file holds, as plain YAML data.
+        schema: The dataclass that it fills; fields of `fields.file_name` and
+            `fields.file_names` name files.
+        folder: The folder of that file.
+    """
+    if not isinstance(data, Mapping) or not dataclasses.is_dataclass(schema):
+        return data
+    marked = {
+        f.name for f in dataclasses.fields(schema) if f.metadata.get("file")
+    }
+    kinds = _fields(schema)
+    found = {}
+    for key, value in data.items():
+        if key in marked and isinstance(value, list):
+            found[key] = [anchor(each, folder) for each in value]
+        elif key in marked:
+            found[key] = anchor(value, folder)
+        else:
+            found[key] = anchored(
+                value, _strip_optional(kinds.get(key)), folder
+            )
+    return found
 
 
 def typed(
@@ -107,9 +139,8 @@ def load_config(
         files.insert(0, source)
     for item in files:
         path = resolve(item)
-        config = typed(
-            schema, read_yaml(path), where=path.name, defaults=config
-        )
+        data = anchored(read_yaml(path), schema, path.parent)
+        config = typed(schema, data, where=path.name, defaults=config)
     config.check(where)
     return config
 

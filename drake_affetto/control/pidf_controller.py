@@ -15,6 +15,7 @@ from pydrake.systems.framework import (
 )
 
 from drake_affetto.common.errors import require, require_range
+from drake_affetto.common.fields import file_name, file_names
 from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.control.pidf import (
     DEFAULT_FILE,
@@ -37,13 +38,14 @@ class PidfConfig:
             from the robot's model of itself; 0: none.
     """
 
-    parameters: str | ControlParameters = DEFAULT_FILE
-    overlays: list[str] = dataclasses.field(default_factory=list)
+    parameters: str | ControlParameters = file_name(DEFAULT_FILE)
+    overlays: list[str] = file_names()
     period: float = 0.005
     gravity_share: float = 0.0
 
     def check(self, where: str) -> None:
-        """Raises InputError naming the first field that cannot be."""
+        """Raises InputError naming the first field or file that cannot be."""
+        load_control(self.parameters, self.overlays)
         require_range(f"{where}.period", self.period, 1e-4, 0.1)
         require_range(f"{where}.gravity_share", self.gravity_share, 0.0, 1.0)
 

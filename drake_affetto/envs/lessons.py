@@ -8,10 +8,16 @@ that another scenario, model or version is taught anew.
 import dataclasses
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from drake_affetto.common.errors import InputError, require, require_range
+from drake_affetto.common.errors import (
+    InputError,
+    require,
+    require_array,
+    require_range,
+)
 from drake_affetto.common.folder_lock import lock_folder
 from drake_affetto.common.output import STORE, prepare_output
 from drake_affetto.common.typing import Array
@@ -19,7 +25,11 @@ from drake_affetto.experiments.skills import teach_positions
 from drake_affetto.experiments.worker import run_task
 from drake_affetto.runner.executor import TrialExecutor
 from drake_affetto.runner.store import TrialStore
-from drake_affetto.teaching.demonstrations import read_demonstrations
+from drake_affetto.station.scenario import Scenario, load_scenario
+from drake_affetto.teaching.demonstrations import (
+    Demonstration,
+    read_demonstrations,
+)
 
 # Of the lessons' places and teacher.
 _SEED = (0x1E550,)
@@ -63,7 +73,7 @@ def load_lessons(scenario: str, lessons: int | str | Path = 16) -> Lessons:
         InputError: If the file does not serve, or the cache cannot be written.
     """
     if not isinstance(lessons, int):
-        return _from_file(lessons)
+        return _from_file(lessons, load_scenario(scenario))
     require_range("lessons", lessons, 2, 1000)
     folder = prepare_output(cache_folder())
     # Environments in several processes: one teaches, the others wait.
@@ -81,12 +91,21 @@ def load_lessons(scenario: str, lessons: int | str | Path = 16) -> Lessons:
     )
 
 
-def _from_file(path: str | Path) -> Lessons:
-    taught = read_demonstrations(path)
+def _from_file(path: str | Path, scenario: Scenario) -> Lessons:
+    taught = _once(read_demonstrations(path))
+    joints = list(scenario.active_joints)
+    size = scenario.dmp.n_basis * len(joints)
     for i, each in enumerate(taught):
+        require(
+            list(each.joint_names) == joints,
+            f"{path}: demonstration {i}: joint_names",
+            list(each.joint_names),
+            f"the scenario's {', '.join(joints)}",
+        )
         for name in ("theta", "task_parameter", "prototype"):
             if getattr(each, name) is None:
                 raise InputError(f"{path}: demonstration {i} has no {name}")
+        require_array(f"{path}: demonstration {i}: theta", each.theta, (size,))
     require(len(taught) >= 2, str(path), len(taught), "2 lessons or more")
     try:
         return Lessons(
@@ -97,3 +116,13 @@ def _from_file(path: str | Path) -> Lessons:
         )
     except ValueError as error:
         raise InputError(f"{path}: lessons of different sizes") from error
+
+
+def _once(taught: list[Demonstration]) -> list[Demonstration]:
+    """Without what an earlier version may have put into the file twice."""
+    found: dict[Any, Demonstration] = {}
+    for i, each in enumerate(taught):
+        # A log of a robot has no seed.
+        same = i if each.seed is None else f"{each.seed} {each.content}"
+        found.setdefault(same, each)
+    return list(found.values())

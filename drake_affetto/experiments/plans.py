@@ -16,6 +16,12 @@ GREATEST_SEED = 2**31 - 1
 class Plan:
     """The plan of a study; fields with a help are options of its command."""
 
+    def __post_init__(self) -> None:
+        """Each body has a repeat of its own."""
+        bodies = getattr(self, "bodies", 0)
+        if isinstance(bodies, int) and bodies > 0:
+            object.__setattr__(self, "repeats", bodies)
+
     def check(self) -> None:
         """Raises InputError for the first value that does not fit."""
         check_ranges(self)
@@ -30,6 +36,8 @@ class DrumPlan(Plan):
         evaluations: Number of test positions, the same throughout the study.
         repeats: Number of times that all of it is done, each with other
             demonstrations.
+        bodies: Number of robots of other bodies, each with a repeat of its
+            own: they take the place of `repeats`. 0: one robot throughout.
         active: Whether the skill's own order is tried too.
         after: Numbers of demonstrations after which the skill is tested; empty
             for every one. After the last it always is.
@@ -45,6 +53,9 @@ class DrumPlan(Plan):
     )
     repeats: int = number(
         1, 1, 1000, "independent repeats, each with other demonstrations"
+    )
+    bodies: int = number(
+        0, 0, 1000, "robots of other bodies, a repeat each; 0: one robot"
     )
     active: bool = option(
         False, "also let the skill choose which demonstration comes next"
@@ -77,6 +88,8 @@ class MirrorPlan(Plan):
         samples: Numbers of demonstrations that the schemes are given.
         repeats: Number of times that all of it is done, each with another
             skill, other demonstrations and other test positions.
+        bodies: Number of robots of other bodies, each with a repeat of its
+            own: they take the place of `repeats`. 0: one robot throughout.
         evaluations: Number of test positions of a repeat.
         demonstrations: Number of demonstrations in direct view, from which
             the skill is learned.
@@ -100,6 +113,9 @@ class MirrorPlan(Plan):
     )
     repeats: int = number(
         20, 1, 1000, "independent repeats, each with another skill and teacher"
+    )
+    bodies: int = number(
+        0, 0, 1000, "robots of other bodies, a repeat each; 0: one robot"
     )
     evaluations: int = number(8, 1, 1000, "number of test positions a repeat")
     demonstrations: int = number(

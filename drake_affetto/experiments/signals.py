@@ -18,10 +18,10 @@ from drake_affetto.experiments.results.trial import TrialResult
 from drake_affetto.experiments.tables import open_store
 from drake_affetto.experiments.trials import (
     Movement,
-    check_scenario,
+    check_entry,
     replay_seed,
     run_trial,
-    runner,
+    runner_of,
 )
 from drake_affetto.runner.executor import Spec
 
@@ -113,7 +113,7 @@ def read_spec(folder: str | Path, key: str) -> tuple[str, Spec]:
         whole, spec = store.spec(key)
     if not isinstance(spec.get("scenario"), dict):
         raise InputError(f"trial {key} is no trial on the station")
-    check_scenario(spec)
+    check_entry(spec["scenario"])
     return whole, spec
 
 
@@ -139,7 +139,7 @@ def read_signals(folder: str | Path, key: str) -> Signals:
         InputError: As `read_spec`, or if nothing was moved in that trial.
     """
     whole, spec = read_spec(folder, key)
-    trials = runner(spec["scenario"]["name"])
+    trials = runner_of(spec["scenario"])
     recording = _record(trials, spec)
     if recording is None:
         raise InputError(

@@ -24,6 +24,7 @@ from drake_affetto.experiments.trials import (
 )
 from drake_affetto.geometry.region import grid_inside
 from drake_affetto.runner.executor import Key, Spec, TrialExecutor
+from drake_affetto.station.content import Content, scenario_content
 from drake_affetto.station.scenario import (
     Scenario,
     SkillConfig,
@@ -181,7 +182,7 @@ def teach_positions(
 def look_at_positions(
     executor: TrialExecutor,
     label: str,
-    scenario: str,
+    scenarios: Sequence[str],
     positions: Sequence[np.ndarray],
     seed: Sequence[int],
 ) -> dict[tuple[int, int], GazeResult]:
@@ -190,7 +191,7 @@ def look_at_positions(
     Args:
         executor: Executor of the study.
         label: Name of this phase of the study.
-        scenario: Scenario, by name or path.
+        scenarios: Scenario of each repeat, by name or path.
         positions: Test positions of each repeat, (count, 2) each, m.
         seed: Seed of the noise, as several numbers.
 
@@ -202,7 +203,9 @@ def look_at_positions(
         label,
         {
             (repeat, i): look(scenario, xy, trial_seed(*seed, repeat, i))
-            for repeat, each in enumerate(positions)
+            for repeat, (scenario, each) in enumerate(
+                zip(scenarios, positions, strict=True)
+            )
             for i, xy in enumerate(each)
         },
     )
@@ -319,17 +322,22 @@ def _mapping(
     from drake_affetto.experiments.view_maps import with_wrong_camera
     from drake_affetto.skill.optical import OpticalMapping
 
+    exact = _optical_map(
+        scenario,
+        direct,
+        (scenario_content(scenario), scenario_content(direct)),
+    )
     believed = with_wrong_camera(
-        _optical_map(scenario, direct),
-        transfer.errors,
-        np.random.default_rng(seed),
+        exact, transfer.errors, np.random.default_rng(seed)
     )
     return OpticalMapping(**vars(believed) | {"plane": transfer.plane})
 
 
 @functools.cache
-def _optical_map(scenario: str, direct: str) -> "OpticalMap":
-    """The optical map between two scenarios, with the camera as it is."""
+def _optical_map(
+    scenario: str, direct: str, _: tuple[Content, Content]
+) -> "OpticalMap":
+    """The optical map between scenarios of that content, all known exactly."""
     from drake_affetto.experiments.view_maps import (
         ViewDomain,
         make_optical_map,

@@ -16,11 +16,14 @@ from drake_affetto.common.typed_json import from_plain, to_plain
 from drake_affetto.common.typing import Array
 from drake_affetto.experiments.episode import Recording, TrialRunner
 from drake_affetto.experiments.trials import (
+    NAME,
+    check_entry,
     draw_positions,
-    software,
+    scenario_entry,
     trial_seed,
 )
 from drake_affetto.runner.executor import Result, Spec, TrialExecutor
+from drake_affetto.station.content import Content
 from drake_affetto.station.scenario import load_scenario
 
 SKILLS = (1, 2, 3, 5, 12)
@@ -98,15 +101,16 @@ class Difference:
 
 
 @functools.cache
-def _runner(scenario: str, time_step: float) -> TrialRunner:
-    loaded = load_scenario(scenario)
+def _runner(content: Content, name: str, time_step: float) -> TrialRunner:
+    loaded = load_scenario(name)
     loaded.plant_config.time_step = time_step
     return TrialRunner(loaded)
 
 
 def run_step_trial(spec: Spec) -> Result:
     """Runs one spec of this study, a demonstration or a strike."""
-    trials = _runner(spec["scenario"], spec["time_step"])
+    entry = spec["scenario"]
+    trials = _runner(check_entry(entry), entry[NAME], spec["time_step"])
     xy, seed = np.array(spec["xy"]), spec["seed"]
     if spec["kind"] == "movement":
         return {}, {"theta": trials.teach(xy, seed).theta}
@@ -195,11 +199,10 @@ def _spec(
 ) -> Mapping[str, Any]:
     return {
         "kind": kind,
-        "scenario": scenario,
+        "scenario": scenario_entry(scenario),
         "time_step": step,
         "xy": np.asarray(xy).tolist(),
         "seed": trial_seed(seed, number),
-        "software": software(),
         **rest,
     }
 

@@ -152,7 +152,8 @@ def _row(row: TrialRow, where: str) -> dict[str, Any]:
             "key": row.key,
             "kind": row.kind,
             "phase": row.phase,
-            "scenario": scenario.get("name"),
+            # Version 0.1.0 called it "name".
+            "scenario": scenario.get("@name", scenario.get("name")),
             "version": scenario.get("version"),
             "finished_at": row.finished_at,
             "x": x,

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
 
+from drake_affetto.common.errors import InputError
 from drake_affetto.experiments.results import DemonstrationResult
 from drake_affetto.experiments.teaching_session import TeachingSession
 from drake_affetto.experiments.trials import demonstration, run_trials
@@ -53,6 +54,13 @@ def _teach_missing(
         )
         for i in session.missing
     }
+    if any(
+        session.content.changed(spec["scenario"]) for spec in specs.values()
+    ):
+        raise InputError(
+            f"the scenario {session.scenario_name!r} changed at this moment; "
+            "start again"
+        )
     finished: dict[int, DemonstrationResult] = {}
     waiting = list(specs)
 

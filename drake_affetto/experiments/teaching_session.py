@@ -4,16 +4,21 @@ The file is the record: a session that is opened again with the same file goes
 on after the demonstrations that it holds.
 """
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 
-from drake_affetto import __version__
-from drake_affetto.common.errors import InputError, require
+from drake_affetto.common.errors import (
+    InputError,
+    require,
+    require_array,
+)
 from drake_affetto.common.output import prepare_output
 from drake_affetto.experiments.plans import TeachPlan
 from drake_affetto.experiments.results import DemonstrationResult
 from drake_affetto.experiments.trials import draw_positions
+from drake_affetto.station.content import scenario_content
 from drake_affetto.station.scenario import load_scenario
 from drake_affetto.teaching.demonstrations import (
     Demonstration,
@@ -31,6 +36,7 @@ class TeachingSession:
     Attributes:
         scenario_name: Name or file of the scenario.
         scenario: Scenario as loaded.
+        content: What determines its demonstrations.
         positions: Positions of the drum (N, 2), m.
         path: File of demonstrations.
         taught: Demonstrations in the file, by number of the position.
@@ -51,6 +57,7 @@ class TeachingSession:
         require(bool(str(path)), "--out", path, "the name of a file")
         require(not self.path.is_dir(), "--out", path, "a file, not a folder")
         self.scenario_name = plan.scenario
+        self.content = scenario_content(plan.scenario)
         self.scenario = load_scenario(plan.scenario)
         for field, value in (
             ("motion_source", "skill"),
@@ -66,6 +73,8 @@ class TeachingSession:
         self._seed = plan.seed
         self.taught: dict[int, Demonstration] = {}
         there = read_demonstrations(self.path) if self.path.exists() else []
+        # An earlier version could put a demonstration in twice.
+        self._count = len(there)
         numbers = [self._number(each) for each in there]
         drawn = draw_positions(
             self.scenario,
@@ -87,24 +96,56 @@ class TeachingSession:
 
     def _number(self, demonstration: Demonstration) -> int:
         """Number of the position of a demonstration in the file."""
-        for what, found, expected in (
-            ("scenario", demonstration.scenario, self.scenario_name),
-            ("version", demonstration.version, __version__),
-            (
-                "seed",
-                None
-                if demonstration.seed is None
-                else demonstration.seed // _SEEDS,
-                self._seed,
-            ),
-        ):
-            if found != expected:
+        expected = {
+            "joints": ", ".join(self.scenario.active_joints),
+            "seed": self._seed,
+            "version": self.content.version,
+        }
+        found = {
+            "joints": ", ".join(demonstration.joint_names),
+            "seed": None
+            if demonstration.seed is None
+            else demonstration.seed // _SEEDS,
+            "version": demonstration.version,
+        }
+        if not demonstration.content:
+            # Of version 0.1.0: these tell a little of what made it.
+            expected["scenario"] = self.scenario_name
+            found["scenario"] = demonstration.scenario
+            expected["length"] = self._theta_size
+            theta = demonstration.theta
+            found["length"] = 0 if theta is None else theta.size
+        for what in expected:
+            if found[what] != expected[what]:
                 raise InputError(
-                    f"{self.path} holds demonstrations of {what} {found}, not "
-                    f"{expected}; name another file"
+                    f"{self.path} holds demonstrations of {what} "
+                    f"{found[what]}, not {expected[what]}; name another file"
                 )
+        if demonstration.content:
+            changed = self.content.changed(demonstration.content)
+            if changed:
+                raise InputError(
+                    f"{self.path} holds demonstrations of another scenario "
+                    f"than {self.scenario_name} is now: other "
+                    f"{', '.join(changed)}; name another file"
+                )
+        for field, shape in (
+            ("theta", (self._theta_size,)),
+            ("task_parameter", (2,)),
+            ("prototype", (None, None)),
+        ):
+            require_array(
+                f"{self.path}: {field} of the demonstration with seed "
+                f"{demonstration.seed}",
+                getattr(demonstration, field),
+                shape,
+            )
         assert demonstration.seed is not None
         return demonstration.seed % _SEEDS
+
+    @property
+    def _theta_size(self) -> int:
+        return self.scenario.dmp.n_basis * len(self.scenario.active_joints)
 
     @property
     def missing(self) -> list[int]:
@@ -121,7 +162,7 @@ class TeachingSession:
 
         Raises:
             InputError: If it cannot be written, or something else has been
-                added to the file meanwhile.
+                added to the file meanwhile. Then it is not added.
         """
         teaching = self.scenario.teaching
         # The last sample is that at the end of the demonstration.
@@ -140,11 +181,12 @@ class TeachingSession:
             max_pull=result.max_pull,
             teacher=teacher,
             scenario=self.scenario_name,
+            content=dataclasses.asdict(self.content),
         )
-        count = append_demonstration(self.path, demonstration)
+        self._count = append_demonstration(
+            self.path, demonstration, self._count
+        )
         self.taught[i] = demonstration
-        if count != len(self.taught):
-            raise InputError(f"another process, too, adds to {self.path}")
 
     def result(self, i: int) -> DemonstrationResult:
         """The demonstration at position `i` that the file holds."""

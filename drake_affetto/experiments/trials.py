@@ -1,7 +1,9 @@
 """The kinds of trial that studies plan, and how a worker runs them.
 
 A spec is a plain mapping. `kind` and `scenario` say what to run where; the
-rest determines the trial, including seeds. The kinds are
+rest determines the trial, including seeds. The scenario is known by its
+content, and a process that runs a spec verifies that it has read the same. The
+kinds are
 
     look           the gaze searches for the drum
     demonstration  the gaze, then a teacher who repeats the movement until the
@@ -13,22 +15,16 @@ rest determines the trial, including seeds. The kinds are
 and `drake_affetto.experiments.results` has the result of each.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 import dataclasses
-import functools
 from typing import Any
 
 import numpy as np
 
 from drake_affetto import __version__
 from drake_affetto.common.errors import InputError
-from drake_affetto.common.fingerprint import (
-    config_values,
-    files_digest,
-    text_digest,
-)
-from drake_affetto.common.nested import leaves
-from drake_affetto.common.resources import models_dir, resolve
+from drake_affetto.common.fingerprint import files_digest
+from drake_affetto.common.resources import models_dir
 from drake_affetto.experiments.episode import (
     GuidedMovement,
     Recording,
@@ -47,27 +43,69 @@ from drake_affetto.geometry.region import spread_inside
 from drake_affetto.runner.executor import Key, Result, Spec, TrialExecutor
 from drake_affetto.skill.policy import Regressor
 from drake_affetto.sound.reward import reward_over_time
+from drake_affetto.station.content import (
+    Content,
+    scenario_content,
+    scenario_source,
+)
 from drake_affetto.station.scenario import Scenario, load_scenario
 
-# One runner, so one Diagram, for each scenario and process.
-_RUNNERS: dict[str, TrialRunner] = {}
+# One runner, so one Diagram, for each content of a scenario and process; beside
+# it, what led to the scenario.
+_RUNNERS: dict[Content, tuple[str, TrialRunner]] = {}
 
-# What of a scenario says how a skill is learned, which no trial depends on: it
-# is given the outcome.
-_LEARNING = ("skill", "transfer")
+# Each keeps a Diagram with its renderers, 36 MiB. Studies of many bodies go
+# from one to the next; an own order of two scenarios needs no more either.
+_MOST_RUNNERS = 6
+
+NAME = "@name"
+"""Entry of a spec's scenario that says what leads to it."""
 
 # Every replay has noise of its own: its seed is this far from the last one's.
 _REPLAY_SEED_STEP = 7919
 
 
 def runner(scenario: str) -> TrialRunner:
-    """This process's runner of a scenario, built when first asked for."""
-    if scenario not in _RUNNERS:
-        _RUNNERS[scenario] = TrialRunner(load_scenario(scenario))
-    return _RUNNERS[scenario]
+    """This process's runner of a scenario as its files are now.
+
+    It is built when first asked for, and again when a file has changed.
+
+    Args:
+        scenario: Scenario, by name or path.
+
+    Raises:
+        InputError: If the scenario does not fit.
+    """
+    return runner_of(scenario_entry(scenario))
 
 
-@functools.cache
+def runner_of(entry: Mapping[str, Any]) -> TrialRunner:
+    """This process's runner of the scenario that a spec was made for.
+
+    Args:
+        entry: Entry "scenario" of the spec.
+
+    Raises:
+        InputError: If this process finds another scenario there: its files
+            are not those of the spec.
+    """
+    content = check_entry(entry, loaded=_RUNNERS)
+    if content not in _RUNNERS:
+        name = entry[NAME]
+        built = TrialRunner(load_scenario(name))
+        # It may have been edited while it was read.
+        check_entry(entry)
+        for old, (source, _) in list(_RUNNERS.items()):
+            # What its files held before is not asked for again.
+            if source == name:
+                del _RUNNERS[old]
+        # The least recently built of too many goes.
+        while len(_RUNNERS) >= _MOST_RUNNERS:
+            del _RUNNERS[next(iter(_RUNNERS))]
+        _RUNNERS[content] = name, built
+    return _RUNNERS[content][1]
+
+
 def models_digest() -> str:
     """Distinguishes the models of this installation from any others."""
     root = models_dir()
@@ -85,42 +123,56 @@ def software() -> dict[str, str]:
     return {"version": __version__, "models": models_digest()}
 
 
-@functools.cache
-def _fingerprint(scenario: str) -> dict[str, str]:
-    """What, besides its own numbers, determines a trial of a scenario."""
-    loaded = config_values(load_scenario(scenario))
-    for name in _LEARNING:
-        del loaded[name]
+def scenario_entry(scenario: str) -> dict[str, str]:
+    """A spec's entry for a scenario: its content, and what leads to it.
+
+    Args:
+        scenario: Scenario, by name or path.
+
+    Raises:
+        InputError: If the scenario does not fit.
+    """
     return {
-        "name": scenario,
-        "values": text_digest(repr(loaded)),
-        "files": files_digest(
-            resolve(leaf)
-            for leaf in leaves(loaded)
-            if isinstance(leaf, str) and leaf.endswith((".yaml", ".yml"))
-        ),
-        "models": models_digest(),
-        "version": __version__,
+        # It does not determine the trial, see `trial_key`.
+        NAME: scenario_source(scenario),
+        **dataclasses.asdict(scenario_content(scenario)),
     }
 
 
-def check_scenario(spec: Spec) -> None:
-    """Raises InputError if a stored spec's scenario is another one by now.
+def check_entry(
+    entry: Mapping[str, Any], loaded: Container[Content] = ()
+) -> Content:
+    """The content in a spec's entry for a scenario, compared with the files'.
 
-    Its trial would give something else than it did.
+    Args:
+        entry: Entry "scenario" of the spec.
+        loaded: Contents for which the files are not asked.
+
+    Raises:
+        InputError: If the scenario is another one by now, or here: the trial
+            would give something else.
     """
-    then = spec["scenario"]
-    now = _fingerprint(then["name"])
-    changed = [name for name in now if then.get(name) != now[name]]
+    # Version 0.1.0 kept the name as a part of the trial.
+    name = entry.get(NAME, entry.get("name"))
+    fields = dataclasses.fields(Content)
+    if not isinstance(name, str):
+        raise InputError("the trial does not say which scenario it is of")
+    if all(isinstance(entry.get(f.name), str) for f in fields):
+        content = Content(**{f.name: entry[f.name] for f in fields})
+        if content in loaded:
+            return content
+    now = scenario_content(name)
+    changed = now.changed(entry)
     if changed:
         raise InputError(
-            f"the scenario {then['name']!r} is not the one of the stored "
-            f"trial: other {', '.join(changed)}"
+            f"the scenario {name!r} is not the one of the trial: other "
+            f"{', '.join(changed)}"
         )
+    return now
 
 
 def _spec(kind: str, scenario: str, **rest: Any) -> Spec:
-    return {"kind": kind, "scenario": _fingerprint(scenario), **rest}
+    return {"kind": kind, "scenario": scenario_entry(scenario), **rest}
 
 
 def demonstration(
@@ -242,8 +294,9 @@ def run_trial(
     kind = spec["kind"]
     if kind not in kinds:
         raise InputError(f"no kind of trial is called {kind!r}")
-    name = spec["scenario"]["name"]
-    return kinds[kind]((runners or {}).get(name) or runner(name), spec)
+    entry = spec["scenario"]
+    given = {scenario_source(k): v for k, v in (runners or {}).items()}
+    return kinds[kind](given.get(entry[NAME]) or runner_of(entry), spec)
 
 
 def run_task(
@@ -269,7 +322,8 @@ def run_trials(
     """
 
     def typed(key: Key, result: Result) -> Any:
-        return unpack(specs[key]["kind"], *result)
+        spec = specs[key]
+        return unpack(spec["kind"], *result, executor.where(spec))
 
     def report(key: Key, result: Result) -> None:
         if on_result is not None:

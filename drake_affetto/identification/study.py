@@ -10,6 +10,7 @@ from drake_affetto import __version__
 from drake_affetto.common.fingerprint import files_digest
 from drake_affetto.common.folder_lock import lock_folder
 from drake_affetto.common.output import write_json, write_text_atomic
+from drake_affetto.common.typed_json import from_plain
 from drake_affetto.identification.fit import FIT_STAGES, FitState, fit_logs
 from drake_affetto.identification.plots import draw_prediction
 from drake_affetto.identification.prediction import predict
@@ -60,9 +61,11 @@ def read_state(path: Path, key: str) -> FitState | None:
         stored = json.loads(path.read_text(encoding="utf-8"))
         if stored["key"] != key:
             return None
-        return FitState(**stored["state"])
-    except (OSError, ValueError, KeyError, TypeError):
+        # A damaged one is no loss: the fit begins anew.
+        state = from_plain(FitState, stored["state"])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
+    return state if 0 <= state.stage <= len(FIT_STAGES) else None
 
 
 def _fit(

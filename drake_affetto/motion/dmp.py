@@ -84,6 +84,11 @@ class _Cache:
             self._known.popitem(last=False)
         return value
 
+    def __getstate__(self) -> dict[str, Any]:
+        # What is remembered is computed again where it is needed: it may be
+        # a thousand times what determines it.
+        return {"_known": OrderedDict()}
+
 
 class Dmp:
     """Dynamic Movement Primitives of any number of joints.

@@ -22,6 +22,7 @@ from drake_affetto.common.errors import (
     require_array,
     require_range,
 )
+from drake_affetto.common.fields import file_name, file_names
 from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.pneumatics.chamber import (
     FLOW_MODE,
@@ -66,12 +67,13 @@ class PneumaticActuationConfig:
     """
 
     mode: str = "flow"
-    parameters: str | PneumaticParameters = DEFAULT_FILE
-    overlays: list[str] = dataclasses.field(default_factory=list)
+    parameters: str | PneumaticParameters = file_name(DEFAULT_FILE)
+    overlays: list[str] = file_names()
     look_ahead: float = 0.0
 
     def check(self, where: str) -> None:
-        """Raises InputError naming the first field that cannot be."""
+        """Raises InputError naming the first field or file that cannot be."""
+        load_parameters(self.parameters, self.overlays)
         require(
             self.mode in _MODES,
             f"{where}.mode",

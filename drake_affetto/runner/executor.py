@@ -20,6 +20,22 @@ Result = tuple[dict[str, Any], Arrays]
 Key = TypeVar("Key", bound=Hashable)
 
 
+def _difference(before: Spec, now: Spec) -> str:
+    """In words, what a stored spec has other than one that is planned."""
+    old, new = before.get("scenario"), now.get("scenario")
+    if isinstance(old, Mapping) and isinstance(new, Mapping):
+        names = [
+            name
+            for name in new
+            if not name.startswith("@") and old.get(name) != new[name]
+        ]
+        if "version" in names:
+            return f"version {old.get('version')}, now {new['version']}"
+        if names:
+            return f"the scenario's {' and '.join(names)} changed"
+    return "the plan is another one"
+
+
 class TrialExecutor:
     """Workers, a store and a progress display, for the phases of one study."""
 
@@ -44,16 +60,25 @@ class TrialExecutor:
             pool: Workers that run already, instead of `workers` new ones or
                 `executor`. The pool is left open.
             quiet: Whether there is no progress display.
+
+        Raises:
+            InputError: If the store is damaged.
         """
+        store.verify()
         # Here, for workers know this module and draw nothing.
         from drake_affetto.runner.progress import make_progress
 
         self._run = run
         self._store = store
         self._owned = pool is None
+        self._quiet = quiet
         self._pool = pool or WorkerPool(workers, executor)
         self._progress = make_progress(quiet=quiet)
         self.reused = 0
+
+    def where(self, spec: Spec) -> str:
+        """How an error names the stored trial of `spec`, with a colon."""
+        return f"{self._store.path}: trial {trial_key(spec)}: "
 
     def __enter__(self) -> "TrialExecutor":
         self._progress.start()
@@ -103,6 +128,7 @@ class TrialExecutor:
         Raises:
             InputError: If workers die again and again.
         """
+        outdated, before = self._store.outdated(label, list(specs.values()))
         self._store.plan(label, list(specs.values()))
         # Equal specs are one trial: they share a key in the store.
         asked: dict[str, list[Key]] = {}
@@ -127,6 +153,15 @@ class TrialExecutor:
 
         missing = dict.fromkeys(trial for trial in trials if not keep(trial))
         self.reused += len(trials) - len(missing)
+        if outdated and missing and not self._quiet:
+            new = trials[next(iter(missing))]
+            self._progress.console.print(
+                f"{label}: {outdated} trials that were finished here do not "
+                f"fit any more ({_difference(before, new)}); {len(missing)} "
+                "are run",
+                highlight=False,
+                soft_wrap=True,
+            )
         bar = self._progress.add_task(
             label, total=len(trials), completed=len(trials) - len(missing)
         )

@@ -7,20 +7,28 @@ each once, so that a trial can be run again from its row.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+import contextlib
 import dataclasses
-import io
+from datetime import datetime
+import hashlib
 import json
 from pathlib import Path
 import re
 import sqlite3
 from typing import Any
-import zipfile
 
 import numpy as np
 
-from drake_affetto.common.errors import InputError, require
+from drake_affetto.common.errors import InputError, require, short
 from drake_affetto.common.fingerprint import text_digest
 from drake_affetto.common.nested import leaves, map_leaves
+from drake_affetto.runner.arrays import pack_arrays, unpack_arrays
+
+FORMAT_VERSION = 1
+"""Version of the file's tables, increased when they change."""
+
+# What tells SQLite's files of this program from others: "AFFT".
+_APPLICATION = 0x41464654
 
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS trials (
@@ -30,7 +38,8 @@ CREATE TABLE IF NOT EXISTS trials (
     result TEXT NOT NULL,
     arrays BLOB,
     finished_at TEXT NOT NULL
-        DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now'))
+        DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now')),
+    digest TEXT
 );
 CREATE TABLE IF NOT EXISTS plans (
     label TEXT NOT NULL,
@@ -43,6 +52,13 @@ CREATE TABLE IF NOT EXISTS inputs (
     arrays BLOB NOT NULL
 )
 """
+
+# Columns that each table has since version 0.1.0, which had no inputs.
+_COLUMNS = {
+    "trials": {"key", "kind", "spec", "result", "arrays", "finished_at"},
+    "plans": {"label", "position", "key"},
+    "inputs": {"name", "arrays"},
+}
 
 
 def _content_name(value: Any) -> str:
@@ -73,29 +89,38 @@ def _object(text: str, where: str) -> dict[str, Any]:
     """The JSON object in `text`; raises InputError naming `where`."""
     try:
         plain = json.loads(text)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, RecursionError) as error:
         raise InputError(f"{where} is damaged: {error}") from error
-    require(isinstance(plain, dict), where, plain, "an object")
+    require(isinstance(plain, dict), where, short(plain), "an object")
     return plain
 
 
+def _determining(value: Any) -> Any:
+    """`value` without the entries whose names begin with "@"."""
+    if isinstance(value, Mapping):
+        return {
+            name: _determining(each)
+            for name, each in value.items()
+            if not str(name).startswith("@")
+        }
+    if isinstance(value, (list, tuple)):
+        return [_determining(each) for each in value]
+    return value
+
+
 def trial_key(spec: Mapping[str, Any]) -> str:
-    """The key of the trial that `spec` determines."""
-    text = json.dumps(_key_values(spec), sort_keys=True)
+    """The key of the trial that `spec` determines.
+
+    Entries whose names begin with "@", anywhere in it, are kept with the trial
+    but do not determine it: where something was found, for instance.
+    """
+    text = json.dumps(_key_values(_determining(spec)), sort_keys=True)
     return text_digest(text, length=None)
 
 
-def pack_arrays(arrays: Mapping[str, np.ndarray]) -> bytes:
-    """Arrays as the bytes of an npz archive."""
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, allow_pickle=False, **arrays)  # type: ignore[arg-type]
-    return buffer.getvalue()
-
-
-def unpack_arrays(data: bytes) -> dict[str, np.ndarray]:
-    """The inverse of `pack_arrays`."""
-    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-        return {name: archive[name] for name in archive.files}
+def _result_digest(result: str, arrays: bytes) -> str:
+    """The digest that is kept of a row's result, to tell damage."""
+    return hashlib.sha256(result.encode() + b"\0" + arrays).hexdigest()[:16]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -155,34 +180,137 @@ class TrialStore:
             InputError: If it cannot be written or is not such a file.
         """
         self.path = Path(path)
+        self._digests: bool | None = None
+        verb = "read" if read_only else "keep"
         try:
             if read_only:
                 uri = f"{self.path.resolve().as_uri()}?mode=ro"
                 self._db = sqlite3.connect(uri, timeout=30.0, uri=True)
+                self._check_format("main", self.path)
                 self._db.execute("SELECT key FROM trials LIMIT 1")
                 return
             self._db = sqlite3.connect(self.path, timeout=30.0)
+            # Before anything is written: it may be another program's file.
+            self._check_format("main", self.path)
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("PRAGMA synchronous=NORMAL")
             self._db.executescript(_SCHEMA)
+            if "digest" not in self._columns("main", "trials"):
+                self._db.execute("ALTER TABLE trials ADD COLUMN digest TEXT")
+            if self._pragma("main", "application_id") == 0:
+                self._db.execute(f"PRAGMA application_id = {_APPLICATION}")
+                self._db.execute(f"PRAGMA user_version = {FORMAT_VERSION}")
             self._db.commit()
         except sqlite3.Error as error:
-            verb = "read" if read_only else "keep"
             raise InputError(
                 f"cannot {verb} trials in {self.path}: {error}"
             ) from error
 
+    def _check_format(self, schema: str, path: Path) -> None:
+        """Raises InputError for a file of another program or later version."""
+        application = self._pragma(schema, "application_id")
+        version = self._pragma(schema, "user_version")
+        rows = self._db.execute(
+            f"SELECT name FROM {schema}.sqlite_master WHERE type = 'table' "
+            "AND name NOT LIKE 'sqlite%'"
+        )
+        tables = {name for (name,) in rows}
+        if application not in (0, _APPLICATION) or (
+            tables and "trials" not in tables
+        ):
+            raise InputError(f"{path} is another program's file, not of trials")
+        if application == _APPLICATION and version > FORMAT_VERSION:
+            raise InputError(
+                f"{path} was written by a later version of drake_affetto: its "
+                f"format is {version}, this version knows {FORMAT_VERSION}"
+            )
+        for table, columns in _COLUMNS.items():
+            missing = columns - self._columns(schema, table)
+            if table in tables and missing:
+                raise InputError(
+                    f"{path} is damaged: its table {table} has no column "
+                    f"{', '.join(sorted(missing))}"
+                )
+
+    def _pragma(self, schema: str, name: str) -> int:
+        return self._db.execute(f"PRAGMA {schema}.{name}").fetchone()[0]
+
+    def _columns(self, schema: str, table: str) -> set[str]:
+        rows = self._db.execute(f"PRAGMA {schema}.table_info({table})")
+        return {row[1] for row in rows}
+
+    @contextlib.contextmanager
+    def _reading(self) -> Iterator[None]:
+        """Tells what SQLite cannot read in one line that names the file."""
+        try:
+            yield
+        except (sqlite3.Error, UnicodeDecodeError) as error:
+            raise InputError(
+                f"cannot read trials in {self.path}: {error}"
+            ) from error
+
+    def verify(self) -> None:
+        """Reads the whole file, so that damage shows before work starts.
+
+        Raises:
+            InputError: For a damaged page or row.
+        """
+        with self._reading():
+            (found,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
+            if found != "ok":
+                raise InputError(
+                    f"{self.path} is damaged: {' '.join(str(found).split())}"
+                )
+            keys = self._db.execute("SELECT key FROM trials").fetchall()
+        for (key,) in keys:
+            self._result(key)
+
     def get(
         self, spec: Mapping[str, Any]
     ) -> tuple[dict[str, Any], dict[str, np.ndarray]] | None:
-        """Result and arrays of a finished trial, or None."""
-        row = self._db.execute(
-            "SELECT result, arrays FROM trials WHERE key = ?",
-            (trial_key(spec),),
-        ).fetchone()
+        """Result and arrays of a finished trial, or None.
+
+        Raises:
+            InputError: If its row is damaged.
+        """
+        row = self._result(trial_key(spec))
         if row is None:
             return None
-        return json.loads(row[0]), unpack_arrays(row[1])
+        result, arrays, where = row
+        try:
+            return result, unpack_arrays(arrays)
+        except InputError as error:
+            raise InputError(f"{where}: its arrays are damaged: {error}") from (
+                error
+            )
+
+    def _result(self, key: str) -> tuple[dict[str, Any], bytes, str] | None:
+        """Result and packed arrays of a row, and its name in errors."""
+        where = f"{self.path}: trial {key}"
+        digest = "digest" if self._has_digest() else "NULL"
+        with self._reading():
+            row = self._db.execute(
+                f"SELECT result, arrays, {digest} FROM trials WHERE key = ?",
+                (key,),
+            ).fetchone()
+        if row is None:
+            return None
+        text, arrays, digest = row
+        result = _object(text, f"{where}: its result")
+        if not isinstance(arrays, bytes):
+            raise InputError(f"{where}: its arrays are missing")
+        if digest is not None and digest != _result_digest(text, arrays):
+            raise InputError(
+                f"{where} is damaged: its result is not the one that was "
+                "written"
+            )
+        return result, arrays, where
+
+    def _has_digest(self) -> bool:
+        """Whether results have digests; in version 0.1.0 they have none."""
+        if self._digests is None:
+            self._digests = "digest" in self._columns("main", "trials")
+        return self._digests
 
     def put(
         self,
@@ -196,17 +324,21 @@ class TrialStore:
             InputError: if the row cannot be written (a full disk, say); rows
                 that were written before stay.
         """
+        text = json.dumps(_key_values(result), allow_nan=False)
+        packed = pack_arrays(arrays)
         try:
             with self._db:
                 self._db.execute(
                     "INSERT OR IGNORE INTO trials "
-                    "(key, kind, spec, result, arrays) VALUES (?, ?, ?, ?, ?)",
+                    "(key, kind, spec, result, arrays, digest) "
+                    "VALUES (?, ?, ?, ?, ?, ?)",
                     (
                         trial_key(spec),
                         str(spec.get("kind", "")),
                         json.dumps(_key_values(spec), sort_keys=True),
-                        json.dumps(_key_values(result), allow_nan=False),
-                        pack_arrays(arrays),
+                        text,
+                        packed,
+                        _result_digest(text, packed),
                     ),
                 )
                 self._db.executemany(
@@ -218,9 +350,11 @@ class TrialStore:
                     ),
                 )
         except sqlite3.Error as error:
+            kept = ""
+            with contextlib.suppress(InputError):
+                kept = f"; {len(self)} finished trials are kept"
             raise InputError(
-                f"cannot write to {self.path}: {error}; "
-                f"{len(self)} finished trials are kept"
+                f"cannot write to {self.path}: {error}{kept}"
             ) from error
 
     def plan(self, label: str, specs: Sequence[Mapping[str, Any]]) -> None:
@@ -238,13 +372,42 @@ class TrialStore:
         except sqlite3.Error as error:
             raise InputError(f"cannot write to {self.path}: {error}") from error
 
+    def outdated(
+        self, label: str, specs: Sequence[Mapping[str, Any]]
+    ) -> tuple[int, dict[str, Any]]:
+        """The finished trials of a phase's last plan that it has no more.
+
+        Args:
+            label: Name of the phase, which is not planned anew yet.
+            specs: What is planned now.
+
+        Returns:
+            Their number, and the spec of one of them, {} if there are none.
+
+        Raises:
+            InputError: If the file cannot be read.
+        """
+        wanted = {trial_key(spec) for spec in specs}
+        with self._reading():
+            found = self._db.execute(
+                "SELECT key, spec FROM plans JOIN trials USING (key) "
+                "WHERE label = ?",
+                (label,),
+            ).fetchall()
+        old = [(key, spec) for key, spec in found if key not in wanted]
+        if not old:
+            return 0, {}
+        key, text = old[0]
+        return len(old), _object(text, f"{self.path}: trial {key}: spec")
+
     def phases(self) -> list[Phase]:
         """The phases planned so far, in their order."""
-        rows = self._db.execute(
-            "SELECT label, COUNT(*), COUNT(trials.key) FROM plans "
-            "LEFT JOIN trials USING (key) GROUP BY label ORDER BY "
-            "MIN(plans.rowid)"
-        )
+        with self._reading():
+            rows = self._db.execute(
+                "SELECT label, COUNT(*), COUNT(trials.key) FROM plans "
+                "LEFT JOIN trials USING (key) GROUP BY label ORDER BY "
+                "MIN(plans.rowid)"
+            ).fetchall()
         return [Phase(*row) for row in rows]
 
     def merge(self, path: str | Path) -> int:
@@ -262,7 +425,11 @@ class TrialStore:
         other = Path(path)
         if not other.is_file():
             raise InputError(f"no file of trials: {other}")
-        columns = "key, kind, spec, result, arrays, finished_at"
+        with TrialStore(other, read_only=True) as checked:
+            checked.verify()
+            columns = "key, kind, spec, result, arrays, finished_at"
+            if checked._has_digest():
+                columns += ", digest"
         before = len(self)
         try:
             self._db.execute("ATTACH DATABASE ? AS other", (str(other),))
@@ -291,7 +458,7 @@ class TrialStore:
         Raises:
             InputError: If a row is damaged.
         """
-        try:
+        with self._reading():
             for key, kind, spec, result, at, phase in self._db.execute(
                 "SELECT key, kind, spec, result, finished_at, (SELECT label "
                 "FROM plans WHERE plans.key = trials.key ORDER BY rowid "
@@ -306,10 +473,6 @@ class TrialStore:
                     at,
                     phase,
                 )
-        except sqlite3.Error as error:
-            raise InputError(
-                f"cannot read trials in {self.path}: {error}"
-            ) from error
 
     def spec(self, key: str) -> tuple[str, dict[str, Any]]:
         """The whole key and the spec of a finished trial, with its arrays.
@@ -321,7 +484,7 @@ class TrialStore:
             InputError: If no trial, or several, have such a key, or an input
                 is not kept: only arrays are, and only since they are.
         """
-        try:
+        with self._reading():
             found = self._db.execute(
                 "SELECT key, spec FROM trials WHERE substr(key, 1, ?) = ?",
                 (len(key), key),
@@ -333,16 +496,10 @@ class TrialStore:
                 )
             whole, text = found[0]
             where = f"{self.path}: trial {whole}"
-            if text_digest(text, length=None) != whole:
+            stored = _object(text, f"{where}: spec")
+            if trial_key(stored) != whole:
                 raise InputError(f"{where}: its spec is damaged")
-            spec = map_leaves(
-                _object(text, f"{where}: spec"),
-                lambda leaf: self._input(leaf, where),
-            )
-        except sqlite3.Error as error:
-            raise InputError(
-                f"cannot read trials in {self.path}: {error}"
-            ) from error
+            spec = map_leaves(stored, lambda leaf: self._input(leaf, where))
         return whole, spec
 
     def _input(self, leaf: Any, where: str) -> Any:
@@ -359,7 +516,7 @@ class TrialStore:
             raise InputError(f"{where} was run with a {name} that is not kept")
         try:
             return unpack_arrays(row[0])["value"]
-        except (ValueError, KeyError, OSError, zipfile.BadZipFile) as error:
+        except (InputError, KeyError, TypeError) as error:
             raise InputError(f"{where}: its {name} is damaged") from error
 
     def _has_inputs(self, schema: str = "main") -> bool:
@@ -371,14 +528,29 @@ class TrialStore:
         )
 
     def finished_at(self) -> list[str]:
-        """When each trial was finished, UTC in ISO 8601, earliest first."""
-        rows = self._db.execute(
-            "SELECT finished_at FROM trials ORDER BY finished_at"
-        )
-        return [row[0] for row in rows]
+        """When each trial was finished, UTC in ISO 8601, earliest first.
+
+        Raises:
+            InputError: If one of them is no time.
+        """
+        with self._reading():
+            rows = self._db.execute(
+                "SELECT key, finished_at FROM trials ORDER BY finished_at"
+            ).fetchall()
+        for key, at in rows:
+            try:
+                datetime.fromisoformat(at)
+            except (TypeError, ValueError) as error:
+                raise InputError(
+                    f"{self.path}: trial {key}: finished_at is {at!r}, "
+                    "expected a time in ISO 8601"
+                ) from error
+        return [at for _, at in rows]
 
     def __len__(self) -> int:
-        return self._db.execute("SELECT COUNT(*) FROM trials").fetchone()[0]
+        with self._reading():
+            query = self._db.execute("SELECT COUNT(*) FROM trials")
+            return query.fetchone()[0]
 
     def close(self) -> None:
         """Closes the file."""

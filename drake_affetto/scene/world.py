@@ -20,7 +20,7 @@ from pydrake.geometry import (
     SceneGraphInspector,
     Sphere,
 )
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import (
     LoadModelDirectives,
     ModelDirectives,
@@ -44,6 +44,7 @@ from drake_affetto.common.errors import (
     require_array,
     require_range,
 )
+from drake_affetto.common.fields import file_name
 from drake_affetto.common.resources import configure_parser, resolve
 from drake_affetto.common.strict_yaml import check_yaml
 from drake_affetto.geometry.kinematics import SerialChain
@@ -107,15 +108,19 @@ class WorldConfig:
             that are not named are at zero.
         frames: Frame of the directives -> its other pose, for instance of
             `affetto_base` or `mirror_pose`.
+        offsets: Frame of the directives -> what is added to its pose.
     """
 
-    directives: str = "package://drake_affetto/scenes/drumming.dmd.yaml"
-    drum: str = "package://drake_affetto/sdf/drum.sdf"
+    directives: str = file_name(
+        "package://drake_affetto/scenes/drumming.dmd.yaml"
+    )
+    drum: str = file_name("package://drake_affetto/sdf/drum.sdf")
     drum_position: list[float] = dataclasses.field(
         default_factory=lambda: [0.235, -0.09]
     )
     default_posture: dict[str, float] = dataclasses.field(default_factory=dict)
     frames: dict[str, FramePose] = dataclasses.field(default_factory=dict)
+    offsets: dict[str, FramePose] = dataclasses.field(default_factory=dict)
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that does not fit."""
@@ -136,8 +141,9 @@ class WorldConfig:
             require_range(
                 f"{where}.default_posture.{name}", angle, -np.pi, np.pi
             )
-        for name, pose in self.frames.items():
-            pose.check(f"{where}.frames.{name}")
+        for field in ("frames", "offsets"):
+            for name, pose in getattr(self, field).items():
+                pose.check(f"{where}.{field}.{name}")
 
 
 def add_world(plant: MultibodyPlant, config: WorldConfig) -> None:
@@ -178,21 +184,32 @@ def add_world(plant: MultibodyPlant, config: WorldConfig) -> None:
 
 
 def _move_frames(directives: ModelDirectives, config: WorldConfig) -> None:
-    """Puts the frames of `config.frames` elsewhere than the file has them."""
+    """Puts frames elsewhere than the file has them.
+
+    Those of `config.frames` first, then those of `config.offsets`, whose turns
+    are about the axes of the frame's base.
+    """
     added = {
         directive.add_frame.name: directive.add_frame
         for directive in directives.directives
         if directive.add_frame is not None
     }
-    for name, pose in config.frames.items():
-        if name not in added:
-            raise InputError(
-                f"world.frames: {config.directives} has no frame {name!r}, "
-                f"expected one of {', '.join(added)}"
-            )
-        X_PF = added[name].X_PF
-        X_PF.translation = np.array(pose.translation, dtype=float)
-        X_PF.rotation.set_rpy_deg(np.array(pose.rotation, dtype=float))
+    for field in ("frames", "offsets"):
+        for name, pose in getattr(config, field).items():
+            if name not in added:
+                raise InputError(
+                    f"world.{field}: {config.directives} has no frame "
+                    f"{name!r}, expected one of {', '.join(added)}"
+                )
+            X_PF = added[name].X_PF
+            translation = np.array(pose.translation, dtype=float)
+            turn = RollPitchYaw(np.deg2rad(pose.rotation)).ToRotationMatrix()
+            if field == "offsets":
+                before = X_PF.GetDeterministicValue()
+                translation = translation + before.translation()
+                turn = turn @ before.rotation()
+            X_PF.translation = translation
+            X_PF.rotation.set_rpy_deg(np.rad2deg(RollPitchYaw(turn).vector()))
 
 
 @contextlib.contextmanager

@@ -288,7 +288,8 @@ def _descend(
         cost[kept] = new_cost[better]
         gradient[kept] = new_gradient[better]
         curvature[kept] = new_curvature[better]
-        ratio = gain / np.maximum(expected, 1e-300)
+        # Of more than 2 only that it is large counts.
+        ratio = np.clip(gain / np.maximum(expected, 1e-300), -1e3, 1e3)
         shrink = np.maximum(1.0 / 9.0, 1.0 - (2.0 * ratio - 1.0) ** 3)
         damping[index] *= np.where(better, shrink, growth[index])
         damping[index] = np.maximum(damping[index], 1e-12)

@@ -14,8 +14,10 @@ from drake_affetto.common.errors import (
     require_choice,
     require_range,
 )
+from drake_affetto.common.fields import file_name
+from drake_affetto.common.fingerprint import config_values
 from drake_affetto.common.resources import models_dir, resolve
-from drake_affetto.common.yaml_config import read_yaml, typed
+from drake_affetto.common.yaml_config import anchored, read_yaml, typed
 from drake_affetto.control.pidf_controller import PidfConfig
 from drake_affetto.motion.dmp_config import DmpConfig
 from drake_affetto.perception.blob import BlobConfig
@@ -31,6 +33,7 @@ from drake_affetto.pneumatics.actuation import PneumaticActuationConfig
 from drake_affetto.scene.world import ACTIVE_JOINTS, WorldConfig
 from drake_affetto.skill.policy import SkillPolicyConfig
 from drake_affetto.sound.config import load_sound_config
+from drake_affetto.station.body import Body
 from drake_affetto.station.drake_config import (
     check_plant_config,
     check_simulator_config,
@@ -39,6 +42,12 @@ from drake_affetto.station.drum_region import DrumRegion
 from drake_affetto.station.model_check import check_models_once
 from drake_affetto.station.variation import VariationConfig
 from drake_affetto.teaching.stroke import TeacherConfig
+
+# The fields that are Drake's own structs.
+_DRAKES: dict[str, Any] = {
+    "simulator_config": SimulatorConfig,
+    "plant_config": MultibodyPlantConfig,
+}
 
 # A file names here the scenario whose values hold where it is silent.
 _EXTENDS = "extends"
@@ -134,13 +143,17 @@ class TransferConfig:
         self.errors.check(f"{where}.errors")
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(eq=False)
 class Scenario:
     """What a station is built from; field names as in Drake's scenarios.
 
+    Two scenarios are equal where all their values are; they can be copied and
+    pickled.
+
     Attributes:
-        random_seed: seed of whatever is random in a simulation.
-        simulation_duration: s, of a trial that nobody stops earlier.
+        random_seed: seed of whatever is random in a simulation that is given
+            none: a station that is served or watched, or taught by mouse.
+            Trials of a study have seeds of their own.
         settling_duration: s, in which the robot comes to rest at its start
             posture before the first trial.
         simulator_config: Drake's own.
@@ -162,6 +175,8 @@ class Scenario:
         dmp: see `motion`.
         control: see `control`.
         pneumatics: see `pneumatics`.
+        body: how this robot departs from its model, which its software takes
+            it to be; see `station.body`.
         variation: whether the robot varies from trial to trial as the real one
             does; see `variation`.
         sound: YAML file of the drum's voice and of the reward.
@@ -178,7 +193,6 @@ class Scenario:
     """
 
     random_seed: int = 0
-    simulation_duration: float = 8.0
     settling_duration: float = 2.0
     simulator_config: SimulatorConfig = dataclasses.field(
         default_factory=SimulatorConfig
@@ -216,14 +230,15 @@ class Scenario:
     pneumatics: PneumaticActuationConfig = dataclasses.field(
         default_factory=PneumaticActuationConfig
     )
+    body: Body = dataclasses.field(default_factory=Body)
     variation: VariationConfig = dataclasses.field(
         default_factory=VariationConfig
     )
-    sound: str = "package://drake_affetto/sound.yaml"
+    sound: str = file_name("package://drake_affetto/sound.yaml")
     teaching: TeacherConfig = dataclasses.field(default_factory=TeacherConfig)
     motion_source: str = "skill"
     valve_source: str = "pidf"
-    wire: str = ""
+    wire: str = file_name("")
     hardware: bool = False
 
     def check(self, where: str = "scenario") -> None:
@@ -233,9 +248,6 @@ class Scenario:
             InputError: naming the first field that does not fit.
         """
         require_range(f"{where}.random_seed", self.random_seed, 0, 2**31 - 1)
-        require_range(
-            f"{where}.simulation_duration", self.simulation_duration, 0, 3600
-        )
         require_range(
             f"{where}.settling_duration", self.settling_duration, 0.1, 60
         )
@@ -308,6 +320,27 @@ class Scenario:
             f"'fixed_yaw' for {mapping}",
         )
 
+    # Drake's structs compare by identity and cannot be pickled: their values
+    # stand for them.
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Scenario):
+            return NotImplemented
+        return bool(config_values(self) == config_values(other))
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = dict(vars(self))
+        for name in _DRAKES:
+            state[name] = config_values(state[name])
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        for name, kind in _DRAKES.items():
+            setattr(self, name, kind(**state[name]))
+
     def _check_periods(self, where: str) -> None:
         """Raises InputError for a period that is not a number of steps."""
         step = self.plant_config.time_step
@@ -346,14 +379,29 @@ def load_scenario(name: str | Path) -> Scenario:
             is unknown, of the wrong type, out of range, or does not fit the
             models.
     """
-    path = _find(name)
-    scenario = _load(path, ())
+    return read_scenario(name)[0]
+
+
+def read_scenario(name: str | Path) -> tuple[Scenario, list[Path]]:
+    """A scenario, and the files that it was read from, its own first.
+
+    Raises:
+        InputError: as `load_scenario`.
+    """
+    path = find_scenario(name)
+    files: list[Path] = []
+    scenario = _load(path, files)
     scenario.check(path.stem)
     check_models_once(scenario, path.stem)
-    return scenario
+    return scenario, files
 
 
-def _find(name: str | Path) -> Path:
+def find_scenario(name: str | Path) -> Path:
+    """The file of a scenario, see `load_scenario`.
+
+    Raises:
+        InputError: if there is no such scenario.
+    """
     text = str(name)
     if text.endswith((".yaml", ".yml")):
         path = Path(text)
@@ -371,9 +419,11 @@ def _find(name: str | Path) -> Path:
     return path
 
 
-def _load(path: Path, seen: tuple[Path, ...]) -> Scenario:
+def _load(path: Path, files: list[Path]) -> Scenario:
+    """Reads a scenario; adds its file, and those it extends, to `files`."""
+    files.append(path)
     path = path.resolve()
-    if path in seen:
+    if path in (each.resolve() for each in files[:-1]):
         raise InputError(f"{path} extends itself")
     data = read_yaml(path)
     base = data.pop(_EXTENDS, None)
@@ -387,5 +437,6 @@ def _load(path: Path, seen: tuple[Path, ...]) -> Scenario:
         )
         if base.endswith((".yaml", ".yml")):
             base = path.parent / base
-        defaults = _load(_find(base), (*seen, path))
+        defaults = _load(find_scenario(base), files)
+    data = anchored(data, Scenario, path.parent)
     return typed(Scenario, data, where=path.stem, defaults=defaults)

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+from drake_affetto.common.fields import file_name, file_names
 from drake_affetto.common.yaml_config import load_config
 from drake_affetto.pneumatics.variation import ActuatorVariation
 from drake_affetto.sensing.readings import SensorParameters
@@ -43,8 +44,8 @@ class VariationConfig:
     """
 
     enabled: bool = False
-    parameters: str = DEFAULT_FILE
-    overlays: list[str] = dataclasses.field(default_factory=list)
+    parameters: str = file_name(DEFAULT_FILE)
+    overlays: list[str] = file_names()
 
     def check(self, where: str) -> None:
         """Raises InputError for a file or a value in it that does not fit."""

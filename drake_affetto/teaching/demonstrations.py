@@ -7,7 +7,7 @@ and `about`; each demonstration is a group `demonstrations/000000`, ... with
   `task_parameter` (d,), `prototype` (bands, frames) and `drum_xy` (2,), each
   with a checksum and the attributes `unit` and `about`;
 - attributes `joint_names` (n), `attempt`, `teacher`, `scenario`, `version`,
-  and where they exist `seed`, `reward` and `max_pull`, N.
+  `content`, and where they exist `seed`, `reward` and `max_pull`, N.
 
 A demonstration is added to a copy, which then replaces the file. If the
 process is killed at any moment, only the demonstration that it was writing is
@@ -18,6 +18,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import contextlib
 import dataclasses
 import fcntl
+import json
 import os
 from pathlib import Path
 import re
@@ -40,7 +41,7 @@ from drake_affetto.common.log_limits import (
     require_between,
     require_times,
 )
-from drake_affetto.common.output import atomic_path
+from drake_affetto.common.output import atomic_path, write_target
 from drake_affetto.common.typing import Array
 
 FORMAT = "drake_affetto demonstrations"
@@ -64,7 +65,20 @@ ROBOT_LOG_JOINTS = (
 """The joints of the 13-DOF robot in the order of its logs: q0, q1, ..."""
 
 # What h5py raises for a damaged file.
-_DAMAGE = (KeyError, OSError, RuntimeError, TypeError, ValueError)
+_DAMAGE = (
+    AttributeError,
+    KeyError,
+    MemoryError,
+    OSError,
+    OverflowError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
+
+# By how much an array in a file can be greater than what is stored of it.
+_GREATEST_RATIO = 1100
+_SMALL = 4096
 
 # Unit and meaning of each array of `Demonstration`, as written to the file.
 _ARRAYS = {
@@ -96,6 +110,8 @@ class Demonstration:
         teacher: Kind of teacher: "simulated", "by mouse", or other text.
         scenario: Name of the scenario, or of the log that it comes from.
         version: Version of this package that made it.
+        content: Digests of what made it: the scenario's values and files, see
+            `station.content`. Empty in files of version 0.1.0.
 
     Raises:
         InputError: If arrays do not fit each other, times do not rise, or
@@ -116,6 +132,7 @@ class Demonstration:
     teacher: str = ""
     scenario: str = ""
     version: str = drake_affetto.__version__
+    content: dict[str, str] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self):
         self.joint_names = tuple(str(name) for name in self.joint_names)
@@ -168,19 +185,30 @@ class Demonstration:
         setattr(self, field, require_array(field, value, shape).copy())
 
 
-def append_demonstration(path: str | Path, demonstration: Demonstration) -> int:
+def append_demonstration(
+    path: str | Path,
+    demonstration: Demonstration,
+    expected: int | None = None,
+) -> int:
     """Adds a demonstration to a file; creates the file if there is none.
 
     Several processes may add to one file.
+
+    Args:
+        path: The file.
+        demonstration: What is added.
+        expected: How many demonstrations the file is known to hold; None if
+            it does not matter.
 
     Returns:
         Number of demonstrations that the file holds now.
 
     Raises:
         InputError: If the file is not one of demonstrations, is damaged or
-            cannot be written. Then it is not changed.
+            cannot be written, or holds another number of demonstrations than
+            expected. Then it is not changed.
     """
-    path = Path(path)
+    path = write_target(path)
     with _only_writer(path), atomic_path(path) as fresh:
         if path.exists():
             shutil.copyfile(path, fresh)
@@ -189,7 +217,14 @@ def append_demonstration(path: str | Path, demonstration: Demonstration) -> int:
             try:
                 group = file.require_group("demonstrations")
                 number = len(group)
+                if expected is not None and number != expected:
+                    raise InputError(
+                        f"another process, too, adds to {path}: it holds "
+                        f"{number} demonstrations, expected {expected}"
+                    )
                 _write(group.create_group(f"{number:06d}"), demonstration)
+            except InputError:
+                raise
             except _DAMAGE as error:
                 raise InputError(
                     f"cannot add to {path}: {_short(error)}"
@@ -206,7 +241,7 @@ def write_demonstrations(
     Raises:
         InputError: If it cannot be written.
     """
-    path = Path(path)
+    path = write_target(path)
     with _only_writer(path), atomic_path(path) as fresh:
         with _opened(fresh, "x", path) as file:
             group = file.require_group("demonstrations")
@@ -234,7 +269,13 @@ def read_demonstrations(path: str | Path) -> list[Demonstration]:
         try:
             demonstrations = []
             group = file["demonstrations"]
-            for name in sorted(group):
+            for number, name in enumerate(sorted(group)):
+                require(
+                    name == f"{number:06d}",
+                    f"demonstration {number:06d}",
+                    "missing",
+                    f"all numbers up to {len(group) - 1:06d}",
+                )
                 where = f"{path}: demonstration {name}"
                 demonstrations.append(_read(group[name]))
             return demonstrations
@@ -374,11 +415,14 @@ def _write(group: h5py.Group, demonstration: Demonstration) -> None:
         value = getattr(demonstration, field)
         if value is not None:
             group.attrs[field] = value
+    if demonstration.content:
+        group.attrs["content"] = json.dumps(demonstration.content)
 
 
 def _read(group: h5py.Group) -> Demonstration:
     arrays: dict[str, Any] = {
-        field: group[field][()] if field in group else None for field in _ARRAYS
+        field: _array(group, field) if field in group else None
+        for field in _ARRAYS
     }
     attributes = group.attrs
     names = [
@@ -401,7 +445,31 @@ def _read(group: h5py.Group) -> Demonstration:
         teacher=str(attributes.get("teacher", "")),
         scenario=str(attributes["scenario"]),
         version=str(attributes["version"]),
+        content=_content(attributes.get("content", "{}")),
     )
+
+
+def _array(group: h5py.Group, field: str) -> Any:
+    """A dataset's content; not if it declares what it cannot hold."""
+    dataset = group[field]
+    require(
+        isinstance(dataset, h5py.Dataset), field, type(dataset), "a dataset"
+    )
+    size = dataset.size * dataset.dtype.itemsize if dataset.shape else 0
+    room = _GREATEST_RATIO * dataset.id.get_storage_size() + _SMALL
+    require(
+        size <= room,
+        field,
+        f"an array of shape {dataset.shape}",
+        f"at most {room} bytes, by what is stored of it",
+    )
+    return dataset[()]
+
+
+def _content(text: Any) -> dict[str, str]:
+    content = json.loads(str(text))
+    require(isinstance(content, dict), "content", content, "an object")
+    return {str(name): str(each) for name, each in content.items()}
 
 
 @contextlib.contextmanager

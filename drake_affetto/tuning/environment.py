@@ -3,11 +3,13 @@
 from collections.abc import Callable
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 
 from drake_affetto.common.typing import Array
 from drake_affetto.control.pidf import PidfGains
+from drake_affetto.station.content import scenario_content
 from drake_affetto.station.scenario import Scenario, load_scenario
 from drake_affetto.tuning.config import (
     TuningConfig,
@@ -181,18 +183,26 @@ class TrackingEnvironment:
         )
 
 
-# The environments of this process, by scenario and tuning file.
-_ENVIRONMENTS: dict[tuple[str, str], TrackingEnvironment] = {}
+# The environments of this process by scenario and tuning file, each with the
+# contents of both that it was built from.
+_ENVIRONMENTS: dict[tuple[str, str], tuple[Any, TrackingEnvironment]] = {}
 
 
 def environment(plan: TunePlan) -> TrackingEnvironment:
-    """This process's environment of a plan, built at the first call."""
+    """This process's environment of a plan.
+
+    It is built at the first call, and again when a file has changed.
+
+    Raises:
+        InputError: If the scenario or the tuning file does not fit.
+    """
     key = (plan.scenario, plan.tuning)
-    if key not in _ENVIRONMENTS:
-        _ENVIRONMENTS[key] = TrackingEnvironment(
-            load_scenario(plan.scenario), load_tuning(plan.tuning)
-        )
-    return _ENVIRONMENTS[key]
+    tuning = load_tuning(plan.tuning)
+    content = scenario_content(plan.scenario), repr(tuning)
+    if key not in _ENVIRONMENTS or _ENVIRONMENTS[key][0] != content:
+        built = TrackingEnvironment(load_scenario(plan.scenario), tuning)
+        _ENVIRONMENTS[key] = content, built
+    return _ENVIRONMENTS[key][1]
 
 
 def run_reference(plan: TunePlan, name: str, gains: Array) -> Rollout:

@@ -5,7 +5,7 @@ import dataclasses
 from typing import ClassVar
 
 from drake_affetto.common.errors import require
-from drake_affetto.common.study_results import StudyResults
+from drake_affetto.common.study_results import COUNT, StudyResults
 from drake_affetto.tuning.config import HELD_OUT, TRAINING
 
 DETAILS_FILE = "details.json"
@@ -60,11 +60,11 @@ class TrialCounts:
         best: Number by which the study knows the best trial.
     """
 
-    finished: int
-    complete: int
-    pruned: int
-    interrupted: int
-    best: int
+    finished: int = dataclasses.field(metadata=COUNT)
+    complete: int = dataclasses.field(metadata=COUNT)
+    pruned: int = dataclasses.field(metadata=COUNT)
+    interrupted: int = dataclasses.field(metadata=COUNT)
+    best: int = dataclasses.field(metadata=COUNT)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -5,26 +5,22 @@ They are kept in an Optuna study in SQLite as they finish, and a study that was
 killed continues from there.
 """
 
-import dataclasses
 import itertools
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import optuna
 from optuna.trial import TrialState
 
-from drake_affetto import __version__
 from drake_affetto.common.errors import InputError
-from drake_affetto.common.fingerprint import text_digest
 from drake_affetto.common.folder_lock import lock_folder
 from drake_affetto.common.output import write_json, write_text_atomic
 from drake_affetto.control.pidf import load_control
-from drake_affetto.pneumatics.parameters import load_parameters
 from drake_affetto.runner.workers import WorkerPool
 from drake_affetto.tuning.cma_es import JointwiseCmaEs
 from drake_affetto.tuning.environment import environment
 from drake_affetto.tuning.evaluation import evaluate, make_details, make_results
+from drake_affetto.tuning.fingerprint import fingerprint
 from drake_affetto.tuning.gains_file import overlay_text, rounded_gains
 from drake_affetto.tuning.plan import TunePlan
 from drake_affetto.tuning.results import DETAILS_FILE, TuningResults
@@ -34,40 +30,7 @@ from drake_affetto.tuning.search import (
     open_study,
     scaled_gains,
 )
-from drake_affetto.tuning.trial import run_trial
-
-
-def fingerprint(plan: TunePlan) -> str:
-    """The digest of all that determines a trial: a study holds one kind.
-
-    It is stored in the study. The digest is that of a `repr`, so that names
-    and fields of the classes below must stay as they are for a stored study
-    to continue.
-    """
-    robot = environment(plan)
-    scenario = robot.station.scenario
-    actuators = load_parameters(
-        scenario.pneumatics.parameters, tuple(scenario.pneumatics.overlays)
-    )
-    control = load_control(
-        scenario.control.parameters, tuple(scenario.control.overlays)
-    )
-    # The scenario's own gains do not count: a trial sets all of them.
-    limits = dataclasses.replace(control, gains={})
-    parts = (
-        __version__,
-        plan.joints,
-        plan.seed,
-        robot.names,
-        robot.tuning,
-        load_control(plan.start).for_joints(robot.names),
-        limits,
-        scenario.control.period,
-        scenario.plant_config.time_step,
-        actuators,
-        np.stack([robot.space.start, robot.lower, robot.upper]).tolist(),
-    )
-    return text_digest(repr(parts))
+from drake_affetto.tuning.trial import forget_studies, run_trial
 
 
 def _prepare_study(
@@ -80,6 +43,7 @@ def _prepare_study(
     """
     path = out / STUDY_FILE
     if restart:
+        forget_studies()
         for suffix in ("", "-wal", "-shm", "-journal"):
             Path(f"{path}{suffix}").unlink(missing_ok=True)
         for old in ("results.json", "gains.yaml", "study.html", DETAILS_FILE):
@@ -127,6 +91,7 @@ def _run_trials(
     from drake_affetto.runner.progress import make_progress
 
     study, search = _prepare_study(out, plan, restart)
+    mark = study.user_attrs["fingerprint"]
     finished = set(finished_trials(study))
     if console is not None and finished:
         console.print(f"{len(finished)} trials were there already")
@@ -155,9 +120,9 @@ def _run_trials(
 
             def remaining(
                 generation: range = generation,
-            ) -> dict[int, tuple[str, TunePlan, int]]:
+            ) -> dict[int, tuple[str, TunePlan, int, str]]:
                 return {
-                    candidate: (str(out), plan, candidate)
+                    candidate: (str(out), plan, candidate, mark)
                     for candidate in generation
                     if candidate not in finished
                 }

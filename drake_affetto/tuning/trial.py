@@ -6,6 +6,7 @@ import numpy as np
 import optuna
 from optuna.trial import TrialState
 
+from drake_affetto.common.errors import InputError
 from drake_affetto.control.pidf import (
     load_control,
 )
@@ -13,6 +14,7 @@ from drake_affetto.tuning.config import (
     TRAINING,
 )
 from drake_affetto.tuning.environment import Rollout, environment
+from drake_affetto.tuning.fingerprint import fingerprint
 from drake_affetto.tuning.plan import (
     TunePlan,
 )
@@ -23,11 +25,18 @@ from drake_affetto.tuning.search import (
     scaled_gains,
 )
 
-# The studies that this process has opened, by folder and plan.
-_STUDIES: dict[tuple[str, TunePlan], tuple[optuna.Study, JointwiseSampler]] = {}
+# The studies that this process has opened, by folder, plan and fingerprint.
+_STUDIES: dict[
+    tuple[str, TunePlan, str], tuple[optuna.Study, JointwiseSampler]
+] = {}
 
 
-def run_trial(out: str, plan: TunePlan, candidate: int) -> int:
+def forget_studies() -> None:
+    """Forgets the studies that this process has opened: one was deleted."""
+    _STUDIES.clear()
+
+
+def run_trial(out: str, plan: TunePlan, candidate: int, mark: str) -> int:
     """Runs one candidate as a trial of the study in the folder `out`.
 
     Args:
@@ -35,12 +44,21 @@ def run_trial(out: str, plan: TunePlan, candidate: int) -> int:
         plan: Plan of the study.
         candidate: Number of the candidate; all earlier generations have
             finished.
+        mark: The study's fingerprint.
 
     Returns:
         The candidate's number.
+
+    Raises:
+        InputError: If what this process reads is not the study's any more.
     """
     robot = environment(plan)
-    key = (out, plan)
+    if fingerprint(plan) != mark:
+        raise InputError(
+            f"the scenario {plan.scenario!r} or another file is not the one "
+            f"that the study in {out} was begun with"
+        )
+    key = (out, plan, mark)
     if key not in _STUDIES:
         _STUDIES[key] = open_study(Path(out), plan)
     study, sampler = _STUDIES[key]

@@ -1,5 +1,7 @@
 import importlib
 import os
+from pathlib import Path
+import signal
 import subprocess
 import sys
 import types
@@ -176,37 +178,169 @@ def test_interrupt_is_one_line_and_exit_130(command, capsys):
     assert capsys.readouterr().err == "affetto: interrupted\n"
 
 
+# A command that does what `work` says, in a process of its own.
+PROBE = """
+import signal, sys, time, types
+from drake_affetto.cli import main as cli
+def run(args):
+{}
+probe = types.ModuleType("drake_affetto.cli.probe")
+probe.add_arguments = lambda parser: None
+probe.run = run
+sys.modules[probe.__name__] = probe
+cli.COMMANDS["probe"] = "probe it"
+sys.exit(cli.main(["probe"]))
+"""
+RICH = (
+    "from rich.console import Console",
+    "Console().print('a line')",
+)
+
+
+def script(*work):
+    return PROBE.format("\n".join(f"    {line}" for line in work))
+
+
+def environment(*, buffered=True):
+    found = dict(os.environ)
+    found.pop("PYTHONUNBUFFERED", None)
+    return found if buffered else found | {"PYTHONUNBUFFERED": "1"}
+
+
 @pytest.mark.parametrize("buffered", [True, False])
-def test_reader_of_the_pipe_may_leave(buffered):
-    code = (
-        "import sys, types; from drake_affetto.cli import main as cli;"
-        "probe = types.ModuleType('drake_affetto.cli.probe');"
-        "probe.add_arguments = lambda parser: None;"
-        "probe.run = lambda args: print('a line');"
-        "sys.modules[probe.__name__] = probe;"
-        "cli.COMMANDS['probe'] = 'probe it';"
-        "sys.exit(cli.main(['probe']))"
-    )
-    environment = {
-        key: value
-        for key, value in os.environ.items()
-        if key != "PYTHONUNBUFFERED"
-    }
-    if not buffered:
-        environment["PYTHONUNBUFFERED"] = "1"
+@pytest.mark.parametrize("work", [("print('a line')",), RICH])
+def test_reader_of_the_pipe_may_leave(work, buffered):
     read, write = os.pipe()
     os.close(read)
     try:
         done = subprocess.run(
-            [sys.executable, "-c", code],
+            [sys.executable, "-c", script(*work)],
             stdout=write,
             stderr=subprocess.PIPE,
             text=True,
-            env=environment,
+            env=environment(buffered=buffered),
         )
     finally:
         os.close(write)
     assert (done.returncode, done.stderr) == (141, "")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full device")
+@pytest.mark.parametrize("buffered", [True, False])
+@pytest.mark.parametrize("words", ["probe", "rich", "--help", "--version"])
+def test_a_full_output_is_one_line(words, buffered):
+    work = RICH if words == "rich" else ("print('a line')",)
+    code = script(*work)
+    if words.startswith("-"):
+        code = code.replace('main(["probe"])', f'main(["{words}"])')
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=environment(buffered=buffered),
+        )
+    assert (done.returncode, done.stderr) == (
+        1,
+        "affetto: error: cannot write the output: No space left on device\n",
+    )
+
+
+@pytest.mark.parametrize(
+    ("closed", "code", "err"),
+    [
+        ("<&-", 0, ""),
+        ("2>&-", 0, ""),
+        (
+            ">&-",
+            1,
+            "affetto: error: cannot write the output: Bad file descriptor\n",
+        ),
+        (">&- 2>&-", 1, ""),
+    ],
+)
+def test_a_closed_stream_is_not_taken_for_a_file(tmp_path, closed, code, err):
+    """What is opened next would get its number, and all that is printed."""
+    path = tmp_path / "results"
+    work = script(
+        f"file = open({str(path)!r}, 'w')",
+        "assert file.fileno() > 2",
+        "print('a line'); print('a note', file=sys.stderr)",
+    )
+    done = subprocess.run(
+        ["sh", "-c", f'exec "$0" -c "$1" {closed}', sys.executable, work],
+        capture_output=True,
+        text=True,
+        env=environment(),
+    )
+    note = "a note\n" if code == 0 and "2>" not in closed else ""
+    assert (done.returncode, done.stderr) == (code, err + note)
+    assert path.exists() == (code == 0)
+    if path.exists():
+        assert path.read_text() == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("SIGTERM", "terminated"), ("SIGHUP", "the terminal was closed")],
+)
+def test_a_signal_ends_it_in_one_line_and_shows_the_cursor(name, said):
+    """Even where the output looks like a terminal, whose cursor is hidden."""
+    work = script(
+        "from rich.console import Console",
+        "console = Console(force_terminal=True)",
+        "with console.status('Waiting'):",
+        "    print('ready', file=sys.__stderr__, flush=True)",
+        "    time.sleep(60)",
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", work],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment() | {"TERM": "xterm"},
+    )
+    assert process.stderr.readline() == "ready\n"
+    number = getattr(signal, name)
+    process.send_signal(number)
+    out, err = process.communicate(timeout=20)
+    assert process.returncode == 128 + number
+    assert err == f"affetto: {said}\n"
+    assert out.rindex("\x1b[?25h") > out.rindex("\x1b[?25l")
+
+
+def test_what_is_to_survive_the_terminal_does():
+    """As `nohup` asks for."""
+    work = script(
+        "import os",
+        "os.kill(os.getpid(), signal.SIGHUP)",
+        "print('goes on')",
+    )
+    done = subprocess.run(
+        ["sh", "-c", 'trap "" HUP; exec "$0" -c "$1"', sys.executable, work],
+        capture_output=True,
+        text=True,
+    )
+    assert (done.returncode, done.stdout) == (0, "goes on\n")
+
+
+def test_handlers_are_as_before_when_it_returns(command):
+    before = signal.getsignal(signal.SIGTERM)
+    inside = []
+    command(lambda args: inside.append(signal.getsignal(signal.SIGTERM)))
+    cli.main(["probe"])
+    assert signal.getsignal(signal.SIGTERM) is before
+    assert inside[0] is not before
+
+
+def test_faults_of_files_keep_their_trace(command):
+    def run(args):
+        Path("/dev/null/nothing").read_text()
+
+    command(run)
+    with pytest.raises(OSError, match="nothing"):
+        cli.main(["probe"])
 
 
 BAD_OPTIONS = [

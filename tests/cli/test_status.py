@@ -80,7 +80,7 @@ def test_only_files_of_trials_are_absorbed(tmp_path):
     with sqlite3.connect(other) as db:
         db.execute("CREATE TABLE letters (a TEXT)")
     with TrialStore(tmp_path / "trials.sqlite") as store:
-        with pytest.raises(InputError, match="cannot take trials over"):
+        with pytest.raises(InputError, match="another program's file"):
             store.merge(other)
         with pytest.raises(InputError, match="no file of trials"):
             store.merge(tmp_path / "nowhere.sqlite")

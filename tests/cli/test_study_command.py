@@ -2,9 +2,11 @@
 
 import argparse
 import dataclasses
+import sqlite3
 
 import pytest
 
+from drake_affetto import __version__
 from drake_affetto.cli.demo import DemoCommand
 from drake_affetto.cli.drum import DrumCommand
 from drake_affetto.cli.main import main
@@ -93,3 +95,57 @@ def test_interrupted_it_tells_that_the_command_goes_on(
 
 def test_a_rate_is_shown_with_its_interval():
     assert rate_text(SuccessRate(0.5, 0.25, 0.75)) == " 50%  [25%, 75%]"
+
+
+def test_what_a_new_version_runs_again_is_told(
+    tmp_path, world, capsys, monkeypatch
+):
+    mine = tmp_path / "mine.yaml"
+    mine.write_text("extends: drumming\n")
+    out = tmp_path / "out"
+    words = "drum --demonstrations 4 --evaluations 2 --after 4 --workers 0"
+    words = [*words.split(), "--scenario", str(mine), "--out", str(out)]
+    assert main(words) == 0
+    first = len(world)
+    assert main(words) == 0
+    told = capsys.readouterr().out
+    assert len(world) == first
+    assert "do not fit" not in told
+
+    mine.write_text("extends: drumming\nsettling_duration: 1.5\n")
+    assert main(words) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert len(world) == 2 * first
+    assert "finished here do not fit any more (the scenario's values" in told
+
+    real = trials.scenario_content
+    monkeypatch.setattr(
+        trials,
+        "scenario_content",
+        lambda name: dataclasses.replace(real(name), version="9.9.9"),
+    )
+    assert main(words) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert f"do not fit any more (version {__version__}, now 9.9.9)" in told
+
+
+def test_a_damaged_store_is_told_before_work_starts(tmp_path, world, capsys):
+    out = tmp_path / "out"
+    words = "drum --demonstrations 4 --evaluations 2 --workers 0 --out"
+    assert main([*words.split(), str(out)]) == 0
+    first = len(world)
+    database = sqlite3.connect(out / "trials.sqlite")
+    database.execute(
+        "UPDATE trials SET result = '{}' WHERE rowid = "
+        "(SELECT max(rowid) FROM trials)"
+    )
+    database.execute("DELETE FROM trials WHERE rowid = 1")
+    database.commit()
+    database.close()
+    capsys.readouterr()
+    assert main([*words.split(), str(out)]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert "trials.sqlite: trial" in err
+    assert "is damaged" in err
+    assert len(world) == first

@@ -3,9 +3,13 @@
 import io
 
 import numpy as np
+import pytest
 from rich.console import Console
 
+from drake_affetto.cli import main as cli
 from drake_affetto.cli.teach import print_outcomes
+from drake_affetto.common.folder_lock import lock_file
+from drake_affetto.experiments import trials
 from drake_affetto.experiments.results import DemonstrationResult
 
 
@@ -19,3 +23,61 @@ def test_a_drum_that_is_not_seen_is_reported():
     print_outcomes([unseen], Console(file=buffer, width=100))
     assert "drum not seen" in buffer.getvalue()
     print_outcomes([], Console(file=buffer, width=100))
+
+
+def teach(path, *more):
+    return cli.main(
+        ["teach", "--positions", "2", "--workers", "0", "--out", str(path)]
+        + list(more)
+    )
+
+
+@pytest.fixture
+def silent(monkeypatch):
+    """A drum that is never seen."""
+    unseen = {
+        "xy": [0.0, 0.0],
+        "found": False,
+        "tau": [0.0, 0.0],
+        "attempts": 0,
+        "success": False,
+        "reward": 0.0,
+        "max_pull": 0.0,
+    }
+    nothing = {
+        "theta": np.zeros(0),
+        "q": np.zeros((0, 0)),
+        "prototype": np.zeros((0, 0)),
+    }
+    monkeypatch.setattr(trials, "run_task", lambda spec: (unseen, nothing))
+
+
+def test_where_nothing_was_taught_no_file_is_named(tmp_path, silent, capsys):
+    path = tmp_path / "taught.h5"
+    assert teach(path) == 1
+    out = capsys.readouterr().out
+    assert "Nothing was taught" in out
+    assert "taught.h5" not in out
+    assert not path.exists()
+
+
+def test_the_second_of_two_is_told_at_the_start(tmp_path, silent, capsys):
+    path = tmp_path / "taught.h5"
+    with lock_file(path, "affetto teach"):
+        assert teach(path) == 2
+    done = capsys.readouterr()
+    assert done.out == ""
+    assert done.err.count("\n") == 1
+    assert f"another `affetto teach` is at work on {path}" in done.err
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("", "--out is ''"), (".", "a file, not a folder")],
+)
+def test_what_is_no_file_is_refused(
+    tmp_path, monkeypatch, capsys, name, message
+):
+    monkeypatch.chdir(tmp_path)
+    assert teach(name) == 2
+    assert message in capsys.readouterr().err

@@ -111,6 +111,17 @@ class TestAtomicPath:
         with pytest.raises(InputError, match="No such file or directory"):
             write_bytes_atomic(tmp_path / "none/x", b"")
 
+    def test_a_link_stays_and_its_target_is_written(self, tmp_path):
+        (tmp_path / "far").mkdir()
+        for name in ("there.json", "not_yet.json"):
+            (tmp_path / name).symlink_to(Path("far") / name)
+        (tmp_path / "far/there.json").write_text("old")
+        for name in ("there.json", "not_yet.json"):
+            write_json(tmp_path / name, [1])
+            assert (tmp_path / name).is_symlink()
+            assert json.loads((tmp_path / "far" / name).read_text()) == [1]
+        assert names(tmp_path / "far") == {"there.json", "not_yet.json"}
+
 
 def test_bytes_and_text_are_written_as_given(tmp_path):
     write_bytes_atomic(tmp_path / "b", bytes(range(256)))

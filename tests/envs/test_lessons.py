@@ -8,6 +8,7 @@ from drake_affetto.common.output import STORE
 from drake_affetto.envs import lessons as module
 from drake_affetto.envs.lessons import load_lessons
 from drake_affetto.runner.store import TrialStore
+from drake_affetto.station.scenario import load_scenario
 from drake_affetto.teaching.demonstrations import (
     Demonstration,
     write_demonstrations,
@@ -40,20 +41,23 @@ def test_lessons_are_taught_once(tmp_path, monkeypatch):
 def make(**missing):
     t = np.linspace(0.0, 3.0, 4)
     values = {
-        "theta": np.arange(6.0),
+        "theta": np.arange(120.0),
         "task_parameter": np.array([0.2, 0.1]),
         "prototype": np.ones((4, 5)),
     }
-    return Demonstration(t, np.zeros((4, 2)), ("a", "b"), **values | missing)
+    names = missing.pop("names", load_scenario("drumming").active_joints)
+    q = np.zeros((missing.pop("samples", 4), len(names)))
+    return Demonstration(t[: len(q)], q, tuple(names), **values | missing)
 
 
 def test_a_file_of_lessons_serves(tmp_path):
     path = tmp_path / "lessons.h5"
-    write_demonstrations(path, [make(), make(theta=np.ones(6))])
+    other = make(theta=np.ones(120), seed=3)
+    write_demonstrations(path, [make(), other, other])
     known = load_lessons("drumming", path)
-    np.testing.assert_array_equal(known.theta, [np.arange(6), np.ones(6)])
+    np.testing.assert_array_equal(known.theta, [np.arange(120), np.ones(120)])
     np.testing.assert_array_equal(known.tau, [[0.2, 0.1]] * 2)
-    assert known.q.shape == (2, 4, 2)
+    assert known.q.shape == (2, 4, 8)
     assert known.prototypes.shape == (2, 4, 5)
 
 
@@ -62,7 +66,10 @@ def test_a_file_of_lessons_serves(tmp_path):
     [
         ([make(), make(theta=None)], "demonstration 1 has no theta"),
         ([make()], "expected 2 lessons"),
-        ([make(), make(theta=np.ones(7))], "different sizes"),
+        ([make(), make(theta=np.ones(80))], "theta is an array of shape"),
+        ([make(), make(names="abcdefgh")], "joint_names is .*'a', 'b'"),
+        ([make(), make(samples=3)], "different sizes"),
+        ([make(seed=1), make(seed=1)], "expected 2 lessons"),
     ],
 )
 def test_a_file_that_does_not_serve_is_told(tmp_path, some, said):

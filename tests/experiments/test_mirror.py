@@ -43,7 +43,7 @@ def test_results_hold_what_is_promised(outcome):
     results = to_plain(outcome.results)
     assert list(results["schemes"]) == list(SCHEMES)
     for scheme in results["schemes"].values():
-        assert list(scheme) == ["2", "3", "4", "5"]
+        assert list(scheme) == ["1", "2", "3", "4", "5"]
         for row in scheme.values():
             rate = row["success_rate"]
             assert rate["low"] <= rate["mean"] <= rate["high"]
@@ -55,8 +55,8 @@ def test_results_hold_what_is_promised(outcome):
             assert row["per_repeat"] == hits.mean(axis=1).tolist()
     # Every pair by success; by landing the pairs that were named beforehand.
     rows = results["comparisons"]
-    assert len(rows) == 4 * 15 + 4 * 2
-    assert sum(row["measure"] == "landing" for row in rows) == 4 * 2
+    assert len(rows) == 5 * 28 + 5 * 2
+    assert sum(row["measure"] == "landing" for row in rows) == 5 * 2
     primary = [row for row in rows if row["primary"]]
     assert {
         (row["a"], row["b"], row["samples"], row["measure"]) for row in primary

@@ -85,10 +85,13 @@ def test_what_cannot_be_run_again_is_told(study, tmp_path, monkeypatch):
         run_again(folder, "none")
     with pytest.raises(InputError, match=r"ends in \.mat or"):
         read_signals(folder, keys["strike"][0]).save(tmp_path / "a.csv")
+    now = trials.scenario_content("drumming")
     monkeypatch.setattr(
-        trials, "_fingerprint", lambda name: {"name": name, "models": "new"}
+        trials,
+        "scenario_content",
+        lambda name: dataclasses.replace(now, files="new"),
     )
-    with pytest.raises(InputError, match=r"not the one .* other models"):
+    with pytest.raises(InputError, match=r"not the one .* other files"):
         run_again(folder, keys["strike"][0])
 
 

@@ -11,6 +11,7 @@ from drake_affetto.experiments.step_convergence import (
     run_step_convergence,
     run_step_trial,
 )
+from drake_affetto.experiments.trials import scenario_entry
 from drake_affetto.runner import InProcessExecutor, TrialExecutor, TrialStore
 
 
@@ -97,7 +98,7 @@ def test_all_steps_play_the_same_movements(tmp_path):
 def test_a_step_that_is_too_long_is_refused(tmp_path):
     spec = {
         "kind": "strike",
-        "scenario": "drumming",
+        "scenario": scenario_entry("drumming"),
         "time_step": 0.01,
         "xy": [0.2, -0.1],
         "seed": 0,

@@ -1,9 +1,11 @@
 """Teaching many places into a file: order, resuming, refusals."""
 
 import contextlib
+import dataclasses
 import io
 import os
 from pathlib import Path
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,6 +19,7 @@ from rich.console import Console
 from drake_affetto.cli import main as cli
 from drake_affetto.cli.teach import print_outcomes
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.resources import models_dir
 from drake_affetto.experiments import trials as tasks
 from drake_affetto.experiments.plans import TeachPlan
 from drake_affetto.experiments.teaching import teach
@@ -24,7 +27,9 @@ from drake_affetto.experiments.teaching_session import TeachingSession
 from drake_affetto.runner.executor import TrialExecutor
 from drake_affetto.runner.store import TrialStore
 from drake_affetto.teaching.demonstrations import (
+    append_demonstration,
     read_demonstrations,
+    write_demonstrations,
 )
 
 
@@ -217,7 +222,7 @@ def test_a_kill_loses_at_most_the_one_in_progress(tmp_path, trials):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"scenario": "mirror"}, "scenario drumming, not mirror"),
+        ({"scenario": "mirror"}, "another scenario than mirror is now"),
         ({"seed": 1}, "seed 0, not 1"),
     ],
 )
@@ -236,8 +241,104 @@ def test_two_at_one_file_are_noticed(tmp_path, trials):
     path = tmp_path / "taught.h5"
     one, other = session(path, 2), session(path, 2)
     taught_here(one)
+    before = path.read_bytes()
     with pytest.raises(InputError, match="another process"):
         taught_here(other)
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        "dmp: {n_basis: 10}",
+        "dmp: {smoothing: 0.04}",
+        "teaching: {duration: 2.5}",
+        "sound: large_drum_sound.yaml",
+    ],
+)
+def test_a_file_whose_scenario_changed_since_is_refused(tmp_path, trials, edit):
+    mine = tmp_path / "mine.yaml"
+    mine.write_text("extends: drumming\n")
+    shutil.copy(models_dir() / "large_drum_sound.yaml", tmp_path)
+    path = tmp_path / "taught.h5"
+    taught_here(session(path, 2, scenario=str(mine)))
+    before = path.read_bytes()
+    mine.write_text(f"extends: drumming\n{edit}\n")
+    with pytest.raises(InputError, match=r"is now: other (values|files); name"):
+        session(path, 3, scenario=str(mine))
+    assert path.read_bytes() == before
+
+
+def test_a_file_goes_on_by_whatever_way_its_scenario_is_named(
+    tmp_path, trials, monkeypatch
+):
+    (tmp_path / "mine.yaml").write_text("extends: drumming\n")
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "taught.h5"
+    taught_here(session(path, 1, scenario="mine.yaml"))
+    for count, name in ((2, "./mine.yaml"), (3, str(tmp_path / "mine.yaml"))):
+        assert len(session(path, count, scenario=name).taught) == count - 1
+        taught_here(session(path, count, scenario=name))
+    assert trials == [0, 1, 2]
+
+
+def test_a_file_of_the_first_version_goes_on_where_it_fits(tmp_path, trials):
+    path = tmp_path / "taught.h5"
+    taught_here(session(path, 2))
+    old = [
+        dataclasses.replace(each, content={})
+        for each in read_demonstrations(path)
+    ]
+    write_demonstrations(path, old)
+    assert len(session(path, 2).taught) == 2
+    with pytest.raises(InputError, match="scenario drumming, not mirror"):
+        session(path, 2, scenario="mirror")
+    old[1].theta = old[1].theta[:80]
+    write_demonstrations(path, old)
+    with pytest.raises(InputError, match="length 80, not 120"):
+        session(path, 2)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"joint_names": tuple("abcdefgh")}, "of joints a, b, c, d, e, f, g"),
+        ({"theta": np.zeros(80)}, r"theta of .* seed 1 is an array of shape"),
+        ({"task_parameter": None}, r"task_parameter of .* seed 1 is an array"),
+        ({"prototype": None}, r"prototype of .* seed 1 is an array"),
+    ],
+)
+def test_what_does_not_fit_the_robot_does_not_count_as_taught(
+    tmp_path, trials, change, message
+):
+    path = tmp_path / "taught.h5"
+    taught_here(session(path, 2))
+    first, second = read_demonstrations(path)
+    write_demonstrations(path, [first, dataclasses.replace(second, **change)])
+    with pytest.raises(InputError, match=message):
+        session(path, 3)
+
+
+def test_what_a_file_holds_twice_counts_once(tmp_path, trials):
+    """As a file that two commands of version 0.1.0 have written."""
+    path = tmp_path / "taught.h5"
+    taught_here(session(path, 2))
+    append_demonstration(path, read_demonstrations(path)[1])
+    again = session(path, 3)
+    assert len(again.taught) == 2
+    taught_here(again)
+    assert len(again.taught) == 3
+    assert trials == [0, 1, 2]
+
+
+def test_a_scenario_that_changes_at_the_start_is_told(tmp_path, trials):
+    mine = tmp_path / "mine.yaml"
+    mine.write_text("extends: drumming\n")
+    started = session(tmp_path / "taught.h5", 2, scenario=str(mine))
+    mine.write_text("extends: drumming\ndmp: {n_basis: 10}\n")
+    with pytest.raises(InputError, match="changed at this moment"):
+        taught_here(started)
+    assert trials == []
 
 
 @pytest.mark.slow

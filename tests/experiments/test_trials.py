@@ -119,7 +119,6 @@ def test_a_trial_is_known_by_all_that_determines_it(tmp_path):
     mine = tmp_path / "mine.yaml"
 
     def key(scenario, overlay):
-        trials._fingerprint.cache_clear()
         gains.write_text(f"gains: {{waist_yaw: {overlay}}}\n")
         mine.write_text(f"extends: drumming\n{scenario}\n")
         return trial_key(trials.look(str(mine), XY, 1))
@@ -134,7 +133,87 @@ def test_a_trial_is_known_by_all_that_determines_it(tmp_path):
     # How a skill is learned is no part of a trial: it is given the outcome.
     learning = "skill: {n_hidden: 30}\ntransfer: {mapping: similarity}"
     assert key(f"{control}\n{learning}", one) == first
-    trials._fingerprint.cache_clear()
+
+
+def test_a_trial_has_one_key_from_wherever_it_is_asked_for(
+    tmp_path, monkeypatch
+):
+    (tmp_path / "c.yaml").write_text("extends: drumming\n")
+    (tmp_path / "below").mkdir()
+    (tmp_path / "link.yaml").symlink_to("c.yaml")
+    keys = set()
+    for folder, name in (
+        (".", "c.yaml"),
+        (".", "./c.yaml"),
+        (".", str(tmp_path / "c.yaml")),
+        (".", "link.yaml"),
+        ("below", "../c.yaml"),
+    ):
+        monkeypatch.chdir(tmp_path / folder)
+        keys.add(trial_key(trials.look(name, XY, 1)))
+    # It is the package's own scenario, and one content is one trial.
+    keys.add(trial_key(trials.look("drumming", XY, 1)))
+    assert len(keys) == 1
+
+
+def test_a_living_process_does_not_keep_what_a_file_held_before(
+    tmp_path, monkeypatch
+):
+    """Neither a notebook's runner nor that of a Dask worker."""
+    built = []
+
+    class Runner:
+        def __init__(self, scenario):
+            built.append(scenario.settling_duration)
+
+        def look(self, xy, seed):
+            return GazeOutcome(True, np.zeros(2), built[-1])
+
+    monkeypatch.setattr(trials, "TrialRunner", Runner)
+    mine = tmp_path / "mine.yaml"
+
+    def write(duration):
+        mine.write_text(f"extends: drumming\nsettling_duration: {duration}\n")
+
+    write(1.25)
+    first = trials.look(str(mine), XY, 1)
+    assert trials.run_trial(first).duration == 1.25
+    assert trials.run_trial(first).duration == 1.25
+    assert built == [1.25]
+    write(1.5)
+    second = trials.look(str(mine), XY, 1)
+    assert trial_key(first) != trial_key(second)
+    # A task in flight still gets what it was planned with ...
+    assert trials.run_trial(first).duration == 1.25
+    # ... the new one what is there now ...
+    assert trials.run_trial(second).duration == 1.5
+    assert built == [1.25, 1.5]
+    # ... and a worker that has never had the first content says so.
+    with pytest.raises(InputError, match=r"not the one .* other values"):
+        trials.run_trial(first)
+    mine.unlink()
+    assert trials.run_trial(second).duration == 1.5
+    third = dict(second, scenario=dict(second["scenario"], values="0" * 16))
+    with pytest.raises(InputError, match="no such scenario file"):
+        trials.run_trial(third)
+
+
+def test_a_scenario_that_changes_while_it_is_read_gives_no_trial(
+    tmp_path, monkeypatch
+):
+    mine = tmp_path / "mine.yaml"
+    mine.write_text("extends: drumming\n")
+
+    def edited(scenario):
+        mine.write_text("extends: drumming\nsettling_duration: 1.5\n")
+        return "built of nobody knows what"
+
+    monkeypatch.setattr(trials, "TrialRunner", edited)
+    spec = trials.look(str(mine), XY, 1)
+    monkeypatch.setattr(trials, "_RUNNERS", {})
+    with pytest.raises(InputError, match="not the one of the trial"):
+        trials.run_trial(spec)
+    assert trials._RUNNERS == {}
 
 
 def test_runners_can_be_handed_in():

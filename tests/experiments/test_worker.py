@@ -18,8 +18,9 @@ def test_it_imports_nothing_heavy():
 
 
 def test_it_leaves_it_to_the_study_to_refuse_a_scenario():
+    before = dict(trials._RUNNERS)
     worker.prepare("no such scenario")
-    assert "no such scenario" not in trials._RUNNERS
+    assert before == trials._RUNNERS
 
 
 def test_it_runs_a_trial(monkeypatch):

@@ -3,6 +3,7 @@
 import argparse
 import csv
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from drake_affetto.cli import identify as command
 from drake_affetto.common.errors import InputError
 from drake_affetto.identification import fit, study, uncertainty
 from drake_affetto.identification.problem import JointProblem
+from drake_affetto.identification.study import read_state
 from drake_affetto.pneumatics.parameters import (
     ActuatorClass,
     JointActuator,
@@ -115,6 +117,14 @@ def test_a_second_run_goes_on_from_the_first(tmp_path, logs, capsys):
     # Another log is another fit, and a torn state is no state.
     run("--fit", logs[2], "--test", logs[1], "--out", out)
     assert "going on from there" not in capsys.readouterr().out
+    for text in (
+        "{",
+        "[" * 10**5,
+        json.dumps(state | {"state": {"values": {"inertia": "low"}}}),
+        json.dumps(state | {"state": {"values": {}, "stage": 99}}),
+    ):
+        (out / "state.json").write_text(text)
+        assert read_state(out / "state.json", state["key"]) is None
     (out / "state.json").write_text("{")
     run("--fit", logs[2], "--test", logs[1], "--out", out)
     assert "going on from there" not in capsys.readouterr().out
@@ -135,8 +145,23 @@ def test_bad_logs_stop_it_before_anything_is_written(tmp_path, logs):
             "--out",
             out,
         )
-    with pytest.raises(InputError, match="run_1"):
-        run("--fit", logs[0], "--test", logs[1], logs[1], "--out", out)
+    copy = tmp_path / "copy.csv"
+    shutil.copy(logs[0], copy)
+    link = tmp_path / "link.csv"
+    link.symlink_to(logs[0])
+    (tmp_path / "far").mkdir()
+    namesake = tmp_path / "far" / logs[0].name
+    shutil.copy(logs[1], namesake)
+    for words, message in (
+        (("--fit", logs[0], "--test", logs[1], logs[1]), "--test: .*run_1"),
+        (("--fit", logs[0], logs[0], "--test", logs[1]), "--fit: .*run_0"),
+        (("--fit", logs[0], "--test", logs[0]), "--test: .* is not held out"),
+        (("--fit", logs[0], "--test", copy), "--test: .*copy.* is the same"),
+        (("--fit", logs[0], "--test", link), "--test: .*link.* is the same"),
+        (("--fit", logs[0], "--test", namesake), "two logs are called run_0"),
+    ):
+        with pytest.raises(InputError, match=message):
+            run(*words, "--out", out)
     assert not out.exists()
 
 

@@ -1,6 +1,8 @@
 """The movement primitive against independent integration and real motion."""
 
+import copy
 from pathlib import Path
+import pickle
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -336,3 +338,16 @@ def test_undetermined_parameters_are_told():
     dmp = Dmp(DmpConfig(ridge=0.0))
     with pytest.raises(InputError, match="ridge"):
         dmp.encode(np.arange(5.0), np.zeros((5, 1)))
+
+
+def test_a_pickled_dmp_leaves_its_grids_behind():
+    dmp = Dmp()
+    small = len(pickle.dumps(dmp))
+    t = np.linspace(0.0, 3.0, 301)
+    q = np.sin(t)[:, None]
+    theta = dmp.encode(t, q)
+    dmp.rollout(theta, q[0])
+    assert len(pickle.dumps(dmp)) == small < 5000
+    again = pickle.loads(pickle.dumps(dmp))
+    np.testing.assert_array_equal(again.encode(t, q), theta)
+    np.testing.assert_array_equal(copy.deepcopy(dmp).encode(t, q), theta)

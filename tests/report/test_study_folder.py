@@ -31,6 +31,18 @@ def change(results, place, value):
         ),
         ("drum", "final.positions.0.xy", [1.0], "positions[0].xy is [1.0]"),
         ("drum", "final.positions.0.success", 1, "positions[0].success is 1"),
+        ("drum", "final.positions", [], "final.positions is empty"),
+        ("drum", "final.positions.0.reward", 1e308, "reward is 1e+308"),
+        ("drum", "final.positions.0.tau", [0.1], "tau is [0.1], expected 2"),
+        ("drum", "separation.hits", -1, "separation.hits is -1"),
+        ("drum", "taught.0.attempts", -3, "taught[0].attempts is -3"),
+        ("drum", "repeats", -1, "repeats is -1"),
+        ("drum", "separation.threshold", 1e308, "threshold is 1e+308"),
+        ("mirror", "evaluations", -2, "evaluations is -2"),
+        ("demo", "mirror.schemes.relearn.rewards", [2.0], "[0] is 2.0"),
+        ("toy", "source.test_mse", -1e-3, "test_mse is -0.001"),
+        ("toy", "source.per_seed", {"a": [1e200]}, "per_seed.a[0] is 1e+200"),
+        ("demo", "mirror.positions", [], "positions is empty"),
         ("drum", "similarity.hit", [0.1], "similarity has lists"),
         ("drum", "separation.auc", "high", "separation.auc is 'high'"),
         ("drum", "seed", True, "seed is True"),
@@ -83,6 +95,13 @@ def test_files_that_are_no_results(tmp_path, text):
     (tmp_path / "results.json").write_bytes(text.encode("latin-1"))
     with pytest.raises(InputError, match=r"results\.json"):
         report.write_report([tmp_path], tmp_path / "page.html")
+
+
+def test_a_long_list_is_not_printed_whole(tmp_path):
+    (tmp_path / "results.json").write_text(str(list(range(100_000))))
+    with pytest.raises(InputError, match="expected an object") as error:
+        report.write_report([tmp_path], tmp_path / "page.html")
+    assert len(str(error.value)) < 300
 
 
 def test_folders_that_do_not_fit(tmp_path):

@@ -3,12 +3,14 @@
 import multiprocessing
 import os
 import signal
+import sqlite3
 import time
 
 import numpy as np
 import pytest
 
 from drake_affetto.common.errors import InputError
+from drake_affetto.runner.arrays import pack_arrays
 from drake_affetto.runner.store import TrialStore, trial_key
 from drake_affetto.skill.elm import ElmRegressor
 
@@ -153,3 +155,162 @@ def test_a_spec_that_was_changed_is_refused(tmp_path):
         store._db.execute("UPDATE trials SET spec = '[]'")
         with pytest.raises(InputError, match="an object"):
             list(store.rows())
+
+
+# --- What was stored is not trusted -------------------------------------------
+
+
+def filled(path):
+    """A store of three trials, closed."""
+    with TrialStore(path) as store:
+        for i in range(3):
+            store.put(spec(i), {"reward": 0.5}, {"x": np.arange(5.0)})
+        store.plan("Phase", [spec(i) for i in range(3)])
+        store._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+
+
+def read_all(path, **how):
+    with TrialStore(path, **how) as store:
+        store.verify()
+        for i in range(3):
+            store.get(spec(i))
+
+
+def refused(path):
+    """The error of whoever opens the file and reads all of it."""
+    with pytest.raises(InputError) as raised:
+        read_all(path)
+    text = str(raised.value)
+    assert str(path) in text
+    assert "\n" not in text
+    assert len(text) < 300
+    return text
+
+
+CUT = pack_arrays({"x": np.arange(4.0)})
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("UPDATE trials SET result = '{' WHERE rowid = 2", "its result is dam"),
+        ("UPDATE trials SET result = '[1]' WHERE rowid = 2", "an object"),
+        ("UPDATE trials SET result = x'80'", "its result"),
+        ("UPDATE trials SET result = '{\"a\": 1}'", "not the one that was"),
+        ("UPDATE trials SET arrays = NULL", "its arrays are missing"),
+        ("UPDATE trials SET arrays = 'text'", "its arrays are missing"),
+        (f"UPDATE trials SET arrays = x'{CUT.hex()}'", "not the one that was"),
+        ("ALTER TABLE trials DROP COLUMN arrays", "no column arrays"),
+        ("ALTER TABLE plans DROP COLUMN key", "no column"),
+        ("PRAGMA user_version = 7", "by a later version"),
+        ("PRAGMA application_id = 77", "another program's file"),
+        ("ALTER TABLE trials RENAME TO results", "another program's file"),
+    ],
+)
+def test_what_was_changed_is_told(tmp_path, change, message):
+    path = tmp_path / "a.sqlite"
+    filled(path)
+    with sqlite3.connect(path) as database:
+        if "DROP COLUMN key" in change:
+            # Of a primary key no column can be dropped.
+            database.execute("DROP TABLE plans")
+            change = "CREATE TABLE plans (label TEXT, position INTEGER)"
+        database.execute(change)
+    database.close()
+    assert message in refused(path)
+
+
+def test_arrays_without_digest_are_read_with_care(tmp_path):
+    """As version 0.1.0 has written them."""
+    path = tmp_path / "a.sqlite"
+    filled(path)
+    database = sqlite3.connect(path)
+    database.execute("ALTER TABLE trials DROP COLUMN digest")
+    database.execute("PRAGMA application_id = 0")
+    database.execute("PRAGMA user_version = 0")
+    database.commit()
+    database.close()
+    with TrialStore(path, read_only=True) as store:
+        assert store.get(spec(1))[0] == {"reward": 0.5}
+    with TrialStore(tmp_path / "b.sqlite") as other:
+        assert other.merge(path) == 3
+        other.verify()
+    with TrialStore(path) as store:
+        store.verify()
+        store.put(spec(3), {}, {})
+        store._db.execute("UPDATE trials SET arrays = x'50' WHERE rowid < 3")
+        store._db.commit()
+    assert "its arrays are damaged: File is not a zip file" in refused(path)
+
+
+def test_another_programs_file_is_left_as_it_is(tmp_path):
+    path = tmp_path / "a.sqlite"
+    database = sqlite3.connect(path)
+    database.execute("CREATE TABLE bookmarks (url TEXT)")
+    database.commit()
+    database.close()
+    before = path.read_bytes()
+    assert "another program's file" in refused(path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+    with (
+        TrialStore(tmp_path / "b.sqlite") as store,
+        pytest.raises(InputError, match="another program's"),
+    ):
+        store.merge(path)
+
+
+@pytest.mark.parametrize("read_only", [False, True])
+def test_a_damaged_page_is_told(tmp_path, read_only):
+    path = tmp_path / "a.sqlite"
+    filled(path)
+    data = bytearray(path.read_bytes())
+    # Every page but the first is overwritten.
+    data[4096:] = b"\xa5" * (len(data) - 4096)
+    path.write_bytes(data)
+    with pytest.raises(InputError, match=r"a\.sqlite") as raised:
+        read_all(path, read_only=read_only)
+    assert "\n" not in str(raised.value)
+
+
+def test_damage_is_told_by_every_way_of_reading(tmp_path):
+    path = tmp_path / "a.sqlite"
+    filled(path)
+    with TrialStore(path) as store:
+        store._db.execute("UPDATE trials SET finished_at = 'yesterday'")
+        with pytest.raises(InputError, match="finished_at is 'yesterday'"):
+            store.finished_at()
+        store._db.execute("DROP TABLE trials")
+        for read in (
+            store.phases,
+            store.finished_at,
+            store.verify,
+            lambda: list(store.rows()),
+            lambda: store.get(spec(0)),
+            lambda: store.spec("a"),
+            lambda: len(store),
+            lambda: store.outdated("Phase", []),
+            lambda: store.put(spec(7), {}, {}),
+        ):
+            with pytest.raises(InputError, match=r"a\.sqlite: no such table"):
+                read()
+
+
+def test_entries_with_an_at_sign_are_kept_but_determine_nothing(tmp_path):
+    here = spec(scenario={"@name": "here.yaml", "values": "1"})
+    there = spec(scenario={"@name": "there.yaml", "values": "1"})
+    other = spec(scenario={"@name": "here.yaml", "values": "2"})
+    assert trial_key(here) == trial_key(there) != trial_key(other)
+    with TrialStore(tmp_path / "a.sqlite") as store:
+        store.put(here, {}, {})
+        assert store.get(there) is not None
+        assert store.spec(trial_key(there))[1] == here
+
+
+def test_trials_that_a_new_plan_does_not_use_are_counted(tmp_path):
+    path = tmp_path / "a.sqlite"
+    filled(path)
+    with TrialStore(path) as store:
+        assert store.outdated("Phase", [spec(i) for i in range(5)]) == (0, {})
+        assert store.outdated("Phase", [spec(2)]) == (2, spec(0))
+        assert store.outdated("Other", [spec(7)]) == (0, {})

@@ -1,10 +1,23 @@
 """Scenarios: what loads, and how what does not fit is told."""
 
+import copy
+import dataclasses
+import pickle
 import re
+import shutil
+import sys
+import typing
 
+import numpy as np
 import pytest
 
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.resources import models_dir
+from drake_affetto.experiments.episode import TrialRunner
+from drake_affetto.experiments.skills import fit_scheme, make_skill
+from drake_affetto.experiments.trials import draw_positions
+from drake_affetto.motion import Dmp, DmpConfig
+from drake_affetto.robot.simulated_robot import check_served
 from drake_affetto.robot.wire import load_wire
 from drake_affetto.station.scenario import (
     Scenario,
@@ -65,6 +78,8 @@ def test_drakes_own_configs_are_read(tmp_path):
         ("gaze: 3", "s.gaze is 3, expected a mapping"),
         ("active_joints: waist_yaw", "s.active_joints is 'waist_yaw'"),
         ("dmp:\n  duration: -1", "s.dmp.duration is -1"),
+        ("simulation_duration: 8.0", "s has no field 'simulation_duration'"),
+        ("wire: none.yaml", "s.wire: no such file: "),
         ("random_seed: 1.5", "s.random_seed is 1.5, expected a whole number"),
         ("look:\n  mode: sideways", "s.look.mode is 'sideways'"),
         ("teaching:\n  lift: {mean: 9.0}", "s.teaching.lift.mean is 9.0"),
@@ -174,7 +189,7 @@ def test_drakes_own_configs_are_read(tmp_path):
             "s.mirrors is [], expected one mirror for s.transfer.mapping",
         ),
         ("transfer: {mapping: optical}", "s.look.mode is 'centre', expected"),
-        ("wire: nowhere.yaml", "s.wire: no such file: nowhere.yaml"),
+        ("wire: nowhere.yaml", "s.wire: no such file: "),
         ("hardware: true", "s.wire: no such file"),
     ],
 )
@@ -200,3 +215,165 @@ def test_a_missing_sound_file_is_named(tmp_path):
     path.write_text("sound: nowhere.yaml")
     with pytest.raises(InputError, match=r"nowhere\.yaml"):
         load_scenario(path)
+
+
+# A file that each field can name, and how a scenario names it.
+NAMED = {
+    "world.directives": (
+        "scenes/drumming.dmd.yaml",
+        "world: {{directives: {}}}",
+    ),
+    "world.drum": ("sdf/drum.sdf", "world: {{drum: {}}}"),
+    "sound": ("sound.yaml", "sound: {}"),
+    "wire": ("robot_wire.yaml", "wire: {}"),
+    "control.parameters": ("control.yaml", "control: {{parameters: {}}}"),
+    "control.overlays": (
+        "control_strokes.yaml",
+        "control: {{overlays: [{}]}}",
+    ),
+    "pneumatics.parameters": (
+        "pneumatics.yaml",
+        "pneumatics: {{parameters: {}}}",
+    ),
+    "pneumatics.overlays": (
+        "pneumatics_robot.yaml",
+        "pneumatics: {{overlays: [{}]}}",
+    ),
+    "variation.parameters": ("variation.yaml", "variation: {{parameters: {}}}"),
+    "variation.overlays": (
+        "variation_robot.yaml",
+        "variation: {{overlays: [{}]}}",
+    ),
+}
+
+
+def file_fields(schema, where=""):
+    """The fields that name files, by their place."""
+    for field in dataclasses.fields(schema):
+        place = f"{where}{field.name}"
+        if field.metadata.get("file"):
+            yield place
+        elif dataclasses.is_dataclass(field.type):
+            yield from file_fields(field.type, f"{place}.")
+
+
+def test_all_fields_that_name_files_are_known_here():
+    assert set(file_fields(Scenario)) == set(NAMED)
+
+
+@pytest.mark.parametrize("place", NAMED)
+def test_a_file_is_relative_to_the_file_that_names_it(
+    tmp_path, monkeypatch, place
+):
+    """Not to where one stands, even if a file of that name is there."""
+    source, text = NAMED[place]
+    for folder in ("mine/parts", "other/parts", "mine/below"):
+        (tmp_path / folder).mkdir(parents=True)
+    mine = tmp_path / "mine/parts/a.file"
+    shutil.copy(models_dir() / source, mine)
+    (tmp_path / "other/parts/a.file").write_text("no such thing: 1")
+    (tmp_path / "mine/s.yaml").write_text(
+        f"extends: drumming\n{text.format('parts/a.file')}\n"
+    )
+    (tmp_path / "mine/below/t.yaml").write_text("extends: ../s.yaml\n")
+    monkeypatch.chdir(tmp_path / "other")
+    for name in ("../mine/s.yaml", "../mine/below/t.yaml"):
+        value = load_scenario(name)
+        for part in place.split("."):
+            value = getattr(value, part)
+        (found,) = [value] if isinstance(value, str) else value
+        assert found == str(mine)
+    mine.unlink()
+    with pytest.raises(InputError, match=r"no such file: .*mine/parts/a\.file"):
+        load_scenario("../mine/s.yaml")
+
+
+@pytest.mark.parametrize("name", ["drumming", "mirror", "robot"])
+def test_a_scenario_is_copied_pickled_and_compared(name):
+    scenario = load_scenario(name)
+    assert copy.deepcopy(scenario) == scenario
+    again = pickle.loads(pickle.dumps(scenario))
+    assert again == scenario == load_scenario(name)
+    assert type(again.plant_config) is type(scenario.plant_config)
+    assert scenario != "drumming"
+    for change in (
+        lambda s: setattr(s.plant_config, "time_step", 0.001),
+        lambda s: setattr(s.simulator_config, "target_realtime_rate", 0.5),
+        lambda s: setattr(s.dmp, "n_basis", 7),
+        lambda s: s.world.drum_position.reverse(),
+    ):
+        other = copy.deepcopy(scenario)
+        change(other)
+        assert other != scenario
+        assert pickle.loads(pickle.dumps(other)) == other
+    assert load_scenario("easy_drumming") != load_scenario("drumming")
+
+
+def schemas(schema, found):
+    """All dataclasses of a scenario."""
+    if schema in found or not dataclasses.is_dataclass(schema):
+        return
+    found.add(schema)
+    waiting = list(typing.get_type_hints(schema).values())
+    while waiting:
+        kind = waiting.pop()
+        waiting += typing.get_args(kind)
+        if isinstance(kind, type):
+            schemas(kind, found)
+
+
+@pytest.mark.slow
+def test_every_field_is_read_by_what_it_configures(monkeypatch, tmp_path):
+    """By more than its own check: a field without effect goes."""
+    found = set()
+    schemas(Scenario, found)
+    read = set()
+    passing = ("dataclasses.py", "fields.py", "fingerprint.py", "copy.py")
+
+    def watch(schema):
+        own = {field.name for field in dataclasses.fields(schema)}
+
+        def get(self, name):
+            caller = sys._getframe(1).f_code
+            if (
+                name in own
+                and caller.co_name not in ("check", "_check_periods")
+                and not caller.co_filename.endswith(passing)
+            ):
+                read.add(f"{schema.__name__}.{name}")
+            return object.__getattribute__(self, name)
+
+        monkeypatch.setattr(schema, "__getattribute__", get)
+
+    for schema in found:
+        watch(schema)
+    fisheye = tmp_path / "fisheye.yaml"
+    fisheye.write_text("extends: mirror\ncamera: {lens: {k1: 0.05}}\n")
+    xy = np.array([0.235, -0.09])
+    runner = TrialRunner(load_scenario("drumming"))
+    runner.gaze(xy, 1)
+    # Out of sight: it searches, and loses what it has seen.
+    runner.gaze(np.array([0.36, 0.1]), 2)
+    theta = runner.teach(xy, 1).theta
+    runner.strike(xy, theta, 1)
+    TrialRunner(load_scenario(fisheye)).gaze(xy, 1)
+    easy = load_scenario("easy_drumming")
+    draw_positions(easy, 2, np.random.default_rng(0))
+    t = np.linspace(0.0, 3.0, 50)
+    Dmp(DmpConfig(method="forcing")).encode(t, np.sin(t)[:, None])
+    skill = make_skill(easy.skill, 0).fit(np.eye(2), np.eye(2))
+    fit_scheme(
+        "transfer_default", skill, np.eye(2), np.eye(2), "mirror", "drumming"
+    )
+    robot = load_scenario("robot")
+    robot.hardware = True
+    with pytest.raises(InputError, match="hardware is True"):
+        check_served(robot, 200.0)
+    robot.hardware = False
+    check_served(robot, 200.0)
+    every = {
+        f"{schema.__name__}.{field.name}"
+        for schema in found
+        for field in dataclasses.fields(schema)
+    }
+    assert sorted(every - read) == []

@@ -280,3 +280,15 @@ def test_sensors_of_a_varying_robot_are_seeded_by_the_trial(varying):
         - port(varying, runs[0], "affetto.joint_state")
     )[:8] / (upper - lower)
     assert 1e-5 < np.abs(error).max() < 0.01
+
+
+def test_the_seed_of_a_scenario_is_that_of_its_noise():
+    station = AffettoStation(load_scenario("drumming"))
+    seen = []
+    for seed in (0, 1, 0):
+        station.scenario.random_seed = seed
+        context = station.CreateDefaultContext()
+        seen.append(port(station, context, "camera.color_image").data.copy())
+    first, other, again = seen
+    np.testing.assert_array_equal(first, again)
+    assert np.mean(first != other) > 0.1

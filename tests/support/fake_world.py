@@ -26,7 +26,7 @@ def tau(name: str, xy) -> np.ndarray:
 def run(spec):
     """Runs a spec of `tasks`; leaves a mark, and takes some time if asked."""
     note(spec)
-    name = spec["scenario"]["name"]
+    name = spec["scenario"]["@name"]
     xy = np.array(spec["xy"])
     rng = np.random.default_rng(spec["seed"])
     seen = tau(name, xy) + 1e-3 * rng.normal(size=2)

@@ -385,3 +385,99 @@ def test_a_log_of_the_real_robot():
     )
     assert moved["left_elbow_flexion"] > 0.4
     assert moved["right_elbow_flexion"] < 0.1
+
+
+def damaged(path, change):
+    """A file of three demonstrations, changed by hand."""
+    write_demonstrations(path, [make(i) for i in range(3)])
+    with h5py.File(path, "r+") as file:
+        change(file["demonstrations"])
+
+
+def replace_theta(group, **how):
+    del group["000001/theta"]
+    group["000001"].create_dataset("theta", **how)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            lambda g: g.__delitem__("000001"),
+            "demonstration 000001 is 'missing'",
+        ),
+        (lambda g: g.move("000002", "000007"), "000002 is 'missing'"),
+        (
+            lambda g: replace_theta(
+                g, shape=(2**40,), dtype=float, chunks=(1024,)
+            ),
+            r"000001: theta is .*\(1099511627776,\)",
+        ),
+        (
+            lambda g: replace_theta(g, shape=(2**40,), dtype=float),
+            r"000001: theta is .*\(1099511627776,\)",
+        ),
+        (lambda g: replace_theta(g, data="words"), "000001: theta"),
+        (
+            lambda g: replace_theta(g, data=np.full(45, np.nan)),
+            r"000001: theta\[0\] is nan",
+        ),
+        (
+            lambda g: (
+                g["000001"].__delitem__("theta"),
+                g["000001"].create_group("theta"),
+            ),
+            "theta is .*expected a dataset",
+        ),
+        (lambda g: g["000001"].__delitem__("q"), "000001"),
+        (lambda g: g["000001"].attrs.__delitem__("attempt"), "attempt"),
+        (
+            lambda g: g["000001"].attrs.__setitem__("content", "[1]"),
+            "content is",
+        ),
+        (
+            lambda g: g["000001"].attrs.__setitem__("content", "{"),
+            "000001 is damaged",
+        ),
+        (
+            lambda g: g["000001"].attrs.__setitem__("seed", "many"),
+            "000001 is damaged",
+        ),
+        (
+            lambda g: g["000001"].attrs.__setitem__("joint_names", 3),
+            "000001 is damaged",
+        ),
+    ],
+)
+def test_what_was_changed_by_hand_is_told(tmp_path, change, message):
+    path = tmp_path / "a.h5"
+    damaged(path, change)
+    with pytest.raises(InputError, match=message) as raised:
+        read_demonstrations(path)
+    assert str(path) in str(raised.value)
+    assert "\n" not in str(raised.value)
+    assert len(str(raised.value)) < 300
+
+
+def test_only_what_was_expected_is_added_to(tmp_path):
+    path = tmp_path / "a.h5"
+    assert append_demonstration(path, make(0), 0) == 1
+    before = path.read_bytes()
+    with pytest.raises(InputError, match="holds 1 demonstrations, expected 4"):
+        append_demonstration(path, make(1), 4)
+    assert path.read_bytes() == before
+    assert append_demonstration(path, make(1), 1) == 2
+
+
+def test_a_link_stays_and_its_target_grows(tmp_path):
+    (tmp_path / "far").mkdir()
+    link = tmp_path / "link.h5"
+    link.symlink_to("far/a.h5")
+    for count in (1, 2):
+        append_demonstration(link, make(count))
+        assert link.is_symlink()
+        assert len(read_demonstrations(tmp_path / "far/a.h5")) == count
+    write_demonstrations(link, [make(5)])
+    assert link.is_symlink()
+    assert len(read_demonstrations(tmp_path / "far/a.h5")) == 1
+    assert [each.name for each in (tmp_path / "far").iterdir()] == ["a.h5"]

@@ -4,8 +4,14 @@ import dataclasses
 from dataclasses import field
 from typing import ClassVar
 
-from drake_affetto.common.study_results import StudyResults
-from drake_affetto.experiments.results.rates import PROBABILITY, Position
+from drake_affetto.common.study_results import COUNT, StudyResults
+from drake_affetto.experiments.results.rates import (
+    NOT_EMPTY,
+    PROBABILITY,
+    REWARD,
+    TAU,
+    Position,
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -21,9 +27,9 @@ class DemoTaught:
     """
 
     xy: Position
-    tau: list[float]
-    attempts: int
-    reward: float
+    tau: list[float] = field(metadata=TAU)
+    attempts: int = field(metadata=COUNT)
+    reward: float = field(metadata=REWARD)
     success: bool = True
 
 
@@ -39,8 +45,8 @@ class DemoTrial:
     """
 
     xy: Position
-    tau: list[float]
-    reward: float
+    tau: list[float] = field(metadata=TAU)
+    reward: float = field(metadata=REWARD)
     success: bool
 
 
@@ -55,9 +61,9 @@ class DemoDrumming:
         success_rate: Share of successful trials.
     """
 
-    demonstrations: int
+    demonstrations: int = field(metadata=COUNT)
     taught: list[DemoTaught]
-    positions: list[DemoTrial]
+    positions: list[DemoTrial] = field(metadata=NOT_EMPTY)
     success_rate: float = field(metadata=PROBABILITY)
 
 
@@ -84,7 +90,7 @@ class DemoScheme:
     """
 
     success_rate: float = field(metadata=PROBABILITY)
-    rewards: list[float]
+    rewards: list[float] = field(metadata=REWARD)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,9 +104,9 @@ class DemoMirror:
         schemes: Results by scheme.
     """
 
-    samples: int
+    samples: int = field(metadata=COUNT)
     taught: list[DemoTaught]
-    positions: list[DemoPosition]
+    positions: list[DemoPosition] = field(metadata=NOT_EMPTY)
     schemes: dict[str, DemoScheme]
 
 

@@ -5,10 +5,13 @@ from dataclasses import field
 from typing import ClassVar
 
 from drake_affetto.common.errors import InputError
-from drake_affetto.common.study_results import StudyResults
+from drake_affetto.common.study_results import COUNT, StudyResults
 from drake_affetto.experiments.results.rates import (
     NOT_EMPTY,
+    NOT_NEGATIVE,
     PROBABILITY,
+    REWARD,
+    TAU,
     Position,
     SuccessRate,
 )
@@ -24,9 +27,9 @@ class _Seen:
         tau: Task parameter τ (2,).
     """
 
-    repeat: int
+    repeat: int = field(metadata=COUNT)
     xy: Position
-    tau: list[float]
+    tau: list[float] = field(metadata=TAU)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,9 +42,9 @@ class TaughtPosition(_Seen):
         max_pull: Greatest force of the teacher, N.
     """
 
-    attempts: int
-    reward: float
-    max_pull: float | None
+    attempts: int = field(metadata=COUNT)
+    reward: float = field(metadata=REWARD)
+    max_pull: float | None = field(metadata=NOT_NEGATIVE)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,9 +57,9 @@ class CurvePoint:
         per_repeat: Share of successes in each repeat.
     """
 
-    n: int
+    n: int = field(metadata=COUNT)
     success_rate: SuccessRate
-    per_repeat: list[float] = field(default_factory=list)
+    per_repeat: list[float] = field(default_factory=list, metadata=PROBABILITY)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,7 +72,7 @@ class LearningCurve:
     """
 
     by_demonstrations: list[CurvePoint] = field(metadata=NOT_EMPTY)
-    n_to_90: int | None
+    n_to_90: int | None = field(metadata=COUNT)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,10 +87,10 @@ class EvaluatedPosition(_Seen):
             down, m; None where nothing was struck.
     """
 
-    reward: float
+    reward: float = field(metadata=REWARD)
     success: bool
-    contact_impulse: float | None
-    landing: float | None = None
+    contact_impulse: float | None = field(metadata=NOT_NEGATIVE)
+    landing: float | None = field(default=None, metadata=NOT_NEGATIVE)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,7 +103,7 @@ class FinalTest:
     """
 
     success_rate: float = field(metadata=PROBABILITY)
-    positions: list[EvaluatedPosition]
+    positions: list[EvaluatedPosition] = field(metadata=NOT_EMPTY)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -117,13 +120,13 @@ class RewardEvaluation:
         hits: Number of trials in which the head was hit.
     """
 
-    auc: float | None
+    auc: float | None = field(metadata=PROBABILITY)
     threshold: float
-    false_hits: int
-    missed_hits: int
+    false_hits: int = field(metadata=COUNT)
+    missed_hits: int = field(metadata=COUNT)
     impulse_threshold: float
-    trials: int
-    hits: int
+    trials: int = field(metadata=COUNT)
+    hits: int = field(metadata=COUNT)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -140,11 +143,11 @@ class RewardRow:
     """
 
     order: str
-    repeat: int
-    n: int
+    repeat: int = field(metadata=COUNT)
+    n: int = field(metadata=COUNT)
     xy: Position
-    reward: float
-    impulse: float | None
+    reward: float = field(metadata=REWARD)
+    impulse: float | None = field(metadata=NOT_NEGATIVE)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -186,24 +189,27 @@ class DrumResults(StudyResults):
         rewards: Reward and contact of all trials.
         similarity: Examples of Fig. 3b; None without both a hit and a miss.
         chance: Success of the best constant stroke, played blind.
+        bodies: How each repeat's robot departs from its model, by name of the
+            number; empty where all are alike.
     """
 
     KIND: ClassVar[str] = "drum"
 
     scenario: str
-    demonstrations: int
-    evaluations: int
-    repeats: int
+    demonstrations: int = field(metadata=COUNT)
+    evaluations: int = field(metadata=COUNT)
+    repeats: int = field(metadata=COUNT)
     taught: list[TaughtPosition]
     first_try: float | None = field(metadata=PROBABILITY)
     by_demonstrations: list[CurvePoint] = field(metadata=NOT_EMPTY)
-    n_to_90: int | None
+    n_to_90: int | None = field(metadata=COUNT)
     active: LearningCurve | None
     final: FinalTest
     separation: RewardEvaluation
     rewards: list[RewardRow]
     similarity: SimilarityTraces | None = None
     chance: SuccessRate | None = None
+    bodies: list[dict[str, float]] = field(default_factory=list)
 
     def check(self, where: str) -> None:
         """Raises InputError where parts do not fit each other."""

@@ -7,9 +7,11 @@ from typing import ClassVar
 import numpy as np
 
 from drake_affetto.common.errors import InputError
-from drake_affetto.common.study_results import StudyResults
+from drake_affetto.common.study_results import COUNT, StudyResults
 from drake_affetto.experiments.results.rates import (
     NOT_EMPTY,
+    PROBABILITY,
+    REWARD,
     Position,
     SuccessRate,
 )
@@ -30,8 +32,8 @@ class SchemeCell:
     """
 
     success_rate: SuccessRate
-    per_repeat: list[float] = field(default_factory=list)
-    rewards: list[float] = field(default_factory=list)
+    per_repeat: list[float] = field(default_factory=list, metadata=PROBABILITY)
+    rewards: list[float] = field(default_factory=list, metadata=REWARD)
     landing: list[float | None] = field(default_factory=list)
     grazes: float | None = None
 
@@ -54,7 +56,7 @@ class SchemeComparisonRow:
 
     a: str
     b: str
-    samples: int
+    samples: int = field(metadata=COUNT)
     difference: float
     p: float | None = None
     effect_size: float | None = None
@@ -80,7 +82,7 @@ class TransferMap:
     """
 
     scheme: str
-    samples: int
+    samples: int = field(metadata=COUNT)
     input_names: list[str]
     output_names: list[str]
     shape: list[int]
@@ -125,15 +127,17 @@ class MirrorResults(StudyResults):
         comparisons: Paired tests of the schemes.
         map: The map of the first repeat; None if no scheme found one.
         chance: Success of the best constant stroke, played blind.
+        bodies: How each repeat's robot departs from its model, by name of the
+            number; empty where all are alike.
     """
 
     KIND: ClassVar[str] = "mirror"
 
     scenario: str
-    samples: list[int] = field(metadata=NOT_EMPTY)
-    repeats: int
-    evaluations: int
-    demonstrations: int
+    samples: list[int] = field(metadata={**NOT_EMPTY, **COUNT})
+    repeats: int = field(metadata=COUNT)
+    evaluations: int = field(metadata=COUNT)
+    demonstrations: int = field(metadata=COUNT)
     choice: str
     variability: float
     workspace: float
@@ -141,6 +145,7 @@ class MirrorResults(StudyResults):
     comparisons: list[SchemeComparisonRow]
     map: TransferMap | None = None
     chance: SuccessRate | None = None
+    bodies: list[dict[str, float]] = field(default_factory=list)
 
     def check(self, where: str) -> None:
         """Raises InputError where parts do not fit each other."""
@@ -189,9 +194,9 @@ class ConditionRow:
     factor: str
     value: str
     scheme: str
-    samples: int
+    samples: int = field(metadata=COUNT)
     success_rate: SuccessRate
-    per_repeat: list[float] = field(default_factory=list)
+    per_repeat: list[float] = field(default_factory=list, metadata=PROBABILITY)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -208,6 +213,6 @@ class ConditionsResults(StudyResults):
     KIND: ClassVar[str] = "conditions"
 
     scenario: str
-    repeats: int
-    evaluations: int
+    repeats: int = field(metadata=COUNT)
+    evaluations: int = field(metadata=COUNT)
     conditions: list[ConditionRow] = field(metadata=NOT_EMPTY)

@@ -4,8 +4,11 @@ import dataclasses
 from dataclasses import field
 from typing import ClassVar
 
-from drake_affetto.common.study_results import StudyResults
-from drake_affetto.experiments.results.rates import NOT_EMPTY
+from drake_affetto.common.study_results import COUNT, StudyResults
+from drake_affetto.experiments.results.rates import (
+    NOT_EMPTY,
+    NOT_NEGATIVE,
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -18,9 +21,9 @@ class SourceErrors:
         rotated_mse: Mean squared error on the rotated points.
     """
 
-    train_mse: float
-    test_mse: float
-    rotated_mse: float
+    train_mse: float = field(metadata=NOT_NEGATIVE)
+    test_mse: float = field(metadata=NOT_NEGATIVE)
+    rotated_mse: float = field(metadata=NOT_NEGATIVE)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,10 +37,10 @@ class TransferErrors:
         other_mse_std: Standard deviation over the subsets.
     """
 
-    train_mse_mean: float
-    train_mse_std: float
-    other_mse_mean: float
-    other_mse_std: float
+    train_mse_mean: float = field(metadata=NOT_NEGATIVE)
+    train_mse_std: float = field(metadata=NOT_NEGATIVE)
+    other_mse_mean: float = field(metadata=NOT_NEGATIVE)
+    other_mse_std: float = field(metadata=NOT_NEGATIVE)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,7 +63,7 @@ class ToyMethod(TransferErrors):
         per_seed: The same errors for each seed.
     """
 
-    other_mse_p95: float
+    other_mse_p95: float = field(metadata=NOT_NEGATIVE)
     per_seed: dict[str, list[float]]
 
 
@@ -122,8 +125,8 @@ class ToyResults(StudyResults):
 
     KIND: ClassVar[str] = "toy"
 
-    seeds: int
-    repeats: int
+    seeds: int = field(metadata=COUNT)
+    repeats: int = field(metadata=COUNT)
     function: str = ""
     paper: ToyPaper
     source: ToySource

@@ -1,12 +1,19 @@
 """Results of trials: one row in the store each."""
 
 import dataclasses
-from typing import Any, ClassVar
+from dataclasses import field
+from typing import Any, ClassVar, get_type_hints
 
 import numpy as np
 
-from drake_affetto.common.errors import InputError
-from drake_affetto.common.typed_json import to_plain
+from drake_affetto.common.errors import InputError, require_array
+from drake_affetto.common.study_results import COUNT
+from drake_affetto.common.typed_json import from_plain, to_plain
+from drake_affetto.experiments.results.rates import (
+    NOT_NEGATIVE,
+    REWARD,
+    TAU,
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,11 +27,11 @@ class GazeResult:
     """
 
     KIND: ClassVar[str] = "look"
-    ARRAYS: ClassVar[tuple[str, ...]] = ()
+    ARRAYS: ClassVar[dict[str, int]] = {}
 
     found: bool
-    tau: list[float]
-    duration: float
+    tau: list[float] = field(metadata=TAU)
+    duration: float = field(metadata=NOT_NEGATIVE)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,15 +52,15 @@ class DemonstrationResult:
     """
 
     KIND: ClassVar[str] = "demonstration"
-    ARRAYS: ClassVar[tuple[str, ...]] = ("theta", "q", "prototype")
+    ARRAYS: ClassVar[dict[str, int]] = {"theta": 1, "q": 2, "prototype": 2}
 
-    xy: list[float]
+    xy: list[float] = field(metadata=TAU)
     found: bool
-    tau: list[float]
-    attempts: int
+    tau: list[float] = field(metadata=TAU)
+    attempts: int = field(metadata=COUNT)
     success: bool
-    reward: float
-    max_pull: float
+    reward: float = field(metadata=REWARD)
+    max_pull: float = field(metadata=NOT_NEGATIVE)
     theta: np.ndarray
     q: np.ndarray
     prototype: np.ndarray
@@ -76,13 +83,13 @@ class StrikeResult:
     """
 
     KIND: ClassVar[str] = "strike"
-    ARRAYS: ClassVar[tuple[str, ...]] = ("reward_over_time",)
+    ARRAYS: ClassVar[dict[str, int]] = {"reward_over_time": 1}
 
-    reward: float
+    reward: float = field(metadata=REWARD)
     success: bool
-    max_force: float
-    impulse: float
-    landing: float
+    max_force: float = field(metadata=NOT_NEGATIVE)
+    impulse: float = field(metadata=NOT_NEGATIVE)
+    landing: float = field(metadata=NOT_NEGATIVE)
     graze: bool
     reward_over_time: np.ndarray
 
@@ -101,14 +108,14 @@ class DrummingResult:
     """
 
     KIND: ClassVar[str] = "drumming"
-    ARRAYS: ClassVar[tuple[str, ...]] = ()
+    ARRAYS: ClassVar[dict[str, int]] = {}
 
     found: bool
-    tau: list[float]
-    reward: float
+    tau: list[float] = field(metadata=TAU)
+    reward: float = field(metadata=REWARD)
     success: bool
-    max_force: float
-    impulse: float
+    max_force: float = field(metadata=NOT_NEGATIVE)
+    impulse: float = field(metadata=NOT_NEGATIVE)
 
 
 TrialResult = GazeResult | DemonstrationResult | StrikeResult | DrummingResult
@@ -130,13 +137,44 @@ def pack(result: TrialResult) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
 
 
 def unpack(
-    kind: str, plain: dict[str, Any], arrays: dict[str, np.ndarray]
+    kind: str,
+    plain: dict[str, Any],
+    arrays: dict[str, np.ndarray],
+    where: str = "",
 ) -> Any:
     """The inverse of `pack`, for a trial of the kind `kind`.
 
+    Args:
+        kind: Kind of trial, a key of `TRIAL_RESULTS`.
+        plain: Its result as it was stored.
+        arrays: Its arrays as they were stored.
+        where: Name of the row in error messages, ending in ": ".
+
     Raises:
-        InputError: If there is no such kind of trial.
+        InputError: If there is no such kind of trial, or the result has other
+            fields or arrays.
     """
     if kind not in TRIAL_RESULTS:
         raise InputError(f"no kind of trial is called {kind!r}")
-    return TRIAL_RESULTS[kind](**plain, **arrays)
+    result = TRIAL_RESULTS[kind]
+    hints = get_type_hints(result)
+    known = {each.name: each.metadata for each in dataclasses.fields(result)}
+    other = sorted({*plain, *arrays} - {*known})
+    if other:
+        raise InputError(f"{where}a {kind} has no field {other[0]!r}")
+    values: dict[str, Any] = {}
+    for name in known:
+        place = f"{where}{name}"
+        found = arrays if name in result.ARRAYS else plain
+        if name not in found:
+            raise InputError(f"{place} is missing")
+        if found is plain:
+            values[name] = from_plain(
+                hints[name], plain[name], place, known[name]
+            )
+        else:
+            shape = (None,) * result.ARRAYS[name]
+            require_array(place, arrays[name], shape)
+            # As it was: it may be of single precision.
+            values[name] = arrays[name]
+    return result(**values)

@@ -1,0 +1,105 @@
+"""Who made what in an output folder: no command overwrites another's work.
+
+A folder of results belongs to the command that made it first. A hidden file in
+it says so, and which single files other commands have put there since.
+
+Nothing here imports more than the standard library.
+"""
+
+import contextlib
+import json
+from pathlib import Path
+from typing import Any
+
+from drake_affetto.common.errors import InputError
+from drake_affetto.common.output import (
+    prepare_output,
+    write_json,
+    write_target,
+)
+
+MARK = ".affetto.json"
+"""File that says who made what, in its folder."""
+
+# The command of a study whose results do not bear its name.
+_COMMANDS = {"scenarios": "mirror"}
+
+# Files that a command puts into folders of others, since before there were
+# marks.
+_GUESTS = {"report.html": "report"}
+
+
+def claim_folder(path: str | Path, command: str) -> Path:
+    """Makes the folder `path` for a command's results.
+
+    Args:
+        path: The folder.
+        command: Name of the command, such as "drum".
+
+    Returns:
+        The folder, with a leading `~` expanded.
+
+    Raises:
+        InputError: If another command's results are in it, or it cannot be
+            written.
+    """
+    folder = prepare_output(path)
+    mark = _read_mark(folder)
+    owner = mark.get("command")
+    if owner is None:
+        write_json(folder / MARK, {**mark, "command": command})
+    elif owner != command:
+        raise InputError(
+            f"--out: {path} holds what `affetto {owner}` made; name another "
+            "folder"
+        )
+    return folder
+
+
+def claim_file(path: str | Path, command: str) -> Path:
+    """Makes the folder of a file that a command will write.
+
+    Args:
+        path: The file.
+        command: Name of the command, such as "export".
+
+    Returns:
+        The file, with a leading `~` expanded.
+
+    Raises:
+        InputError: If it is a folder, another command made the file as a part
+            of its results, or its folder cannot be written.
+    """
+    path = Path(path).expanduser()
+    if not path.name or path.is_dir():
+        raise InputError(f"{path} is a folder, expected the name of a file")
+    target = write_target(path)
+    prepare_output(target.parent)
+    mark = _read_mark(target.parent)
+    owner = mark.get("command")
+    if owner is None:
+        return path
+    files = {**_GUESTS, **mark.get("files", {})}
+    maker = files.get(target.name, owner)
+    if target.exists() and maker != command:
+        raise InputError(
+            f"{path} is a file that `affetto {maker}` made; name another file"
+        )
+    if files.get(target.name) != command:
+        mark["files"] = {**mark.get("files", {}), target.name: command}
+        write_json(target.parent / MARK, mark)
+    return path
+
+
+def _read_mark(folder: Path) -> dict[str, Any]:
+    """The mark of a folder; of older ones what its results tell."""
+    with contextlib.suppress(OSError, ValueError, RecursionError):
+        mark = json.loads((folder / MARK).read_bytes())
+        if isinstance(mark, dict) and isinstance(mark.get("files", {}), dict):
+            return mark
+    with contextlib.suppress(OSError, ValueError, RecursionError):
+        results = json.loads((folder / "results.json").read_bytes())
+        study = results.get("study") if isinstance(results, dict) else None
+        if isinstance(study, str):
+            return {"command": _COMMANDS.get(study, study)}
+    return {}
