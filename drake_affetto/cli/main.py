@@ -24,7 +24,7 @@ import threading
 from typing import Any, NoReturn
 
 from drake_affetto import __version__
-from drake_affetto.common.errors import InputError
+from drake_affetto.common.errors import InputError, one_line
 
 # Name of a command, which is also its module beside this one, and what it does.
 COMMANDS = {
@@ -66,14 +66,10 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         print(
-            f"{_PROGRAM}: error: {_one_line(message)} (see {self.prog} --help)",
+            f"{_PROGRAM}: error: {one_line(message)} (see {self.prog} --help)",
             file=sys.stderr,
         )
         raise SystemExit(2)
-
-
-def _one_line(message: object) -> str:
-    return " ".join(str(message).split())
 
 
 def _chosen(argv: Sequence[str]) -> str | None:
@@ -191,7 +187,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with _ends_by_signal():
             return _run(argv)
     except InputError as error:
-        _say(f"error: {_one_line(error)}")
+        _say(f"error: {one_line(error)}")
         return 2
     except Ended as ending:
         _drop_output()
