@@ -25,7 +25,7 @@ import threading
 from typing import Any, NoReturn
 
 from drake_affetto import __version__
-from drake_affetto.common.errors import InputError
+from drake_affetto.common.errors import InputError, one_line
 
 # Name of a command, which is also its module beside this one, and what it does.
 COMMANDS = {
@@ -75,7 +75,7 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         print(
-            f"{_PROGRAM}: error: {_one_line(message)} (see {self.prog} --help)",
+            f"{_PROGRAM}: error: {one_line(message)} (see {self.prog} --help)",
             file=sys.stderr,
         )
         raise SystemExit(2)
@@ -85,10 +85,6 @@ _NEGATIVE_NUMBER = re.compile(
     r"-(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|inf(?:inity)?|nan)$",
     re.IGNORECASE,
 )
-
-
-def _one_line(message: object) -> str:
-    return " ".join(str(message).split())
 
 
 def _chosen(argv: Sequence[str]) -> str | None:
@@ -206,7 +202,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with _ends_by_signal():
             return _run(argv)
     except InputError as error:
-        _say(f"error: {_one_line(error)}")
+        _say(f"error: {one_line(error)}")
         return 2
     except Ended as ending:
         _drop_output()

@@ -36,6 +36,11 @@ def require(condition: bool, field: str, value: Any, expected: str) -> None:
         raise InputError(f"{field} is {shown(value)}, expected {expected}")
 
 
+def one_line(message: object) -> str:
+    """A message of others, which may have several lines, as one."""
+    return " ".join(str(message).split())
+
+
 class _Short:
     """Looks like a value, but not longer than a line."""
 

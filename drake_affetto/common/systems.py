@@ -5,6 +5,7 @@ Importing it imports Drake, as `scalars` does and no other module of this room.
 
 from collections.abc import Callable
 from typing import Any, cast
+import weakref
 
 from pydrake.systems.framework import (
     DiagramBuilder,
@@ -80,6 +81,28 @@ def export(builder: DiagramBuilder, part: str, *ports: OutputPort) -> None:
     """
     for port in ports:
         builder.ExportOutput(port, f"{part}.{port.get_name()}")
+
+
+def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
+    """A system's own method, for Drake to call, that does not keep the system.
+
+    What `DeclareAbstractOutputPort` and `DeclareCacheEntry` are given lives as
+    long as the system, which a bound method keeps alive in its turn: neither
+    ever goes, nor does the diagram around them. The other declarations take
+    bound methods. For the same reason a system keeps the index of a cache
+    entry, not the entry.
+
+    Args:
+        method: Bound method of the system.
+    """
+    found = weakref.WeakMethod(method)
+
+    def call(*args: Any) -> Any:
+        bound = found()
+        assert bound is not None, "the system is gone"
+        return bound(*args)
+
+    return call
 
 
 class _Getter:

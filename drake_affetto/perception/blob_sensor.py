@@ -15,7 +15,7 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.sensors import ImageRgba8U
 
-from drake_affetto.common.systems import input_port, output_port
+from drake_affetto.common.systems import input_port, output_port, weakly
 from drake_affetto.perception.blob import (
     Blob,
     BlobCalibration,
@@ -45,13 +45,15 @@ class BlobReporter(LeafSystem):
 
     def _declare_outputs(self, prerequisites: set) -> None:
         """Declares the outputs, which depend on `prerequisites`."""
-        self._pixels_cache = self.DeclareCacheEntry(
+        pixels = self.DeclareCacheEntry(
             description="blob in pixels",
             value_producer=ValueProducer(
-                allocate=Value(np.zeros(4)).Clone, calc=self._calc_detection
+                allocate=Value(np.zeros(4)).Clone,
+                calc=weakly(self._calc_detection),
             ),
             prerequisites_of_calc=prerequisites,
         )
+        self._pixels_index = pixels.cache_index()
         self.DeclareVectorOutputPort(
             "blob",
             3,
@@ -99,7 +101,7 @@ class BlobReporter(LeafSystem):
         )
 
     def _calc_blob(self, context: Context, output: BasicVector) -> None:
-        pixels: Any = self._pixels_cache.Eval(context)
+        pixels: Any = self.get_cache_entry(self._pixels_index).Eval(context)
         if pixels[2] <= 0.0:
             output.SetFromVector(np.array([LOST, LOST, 0.0]))
             return
@@ -107,7 +109,7 @@ class BlobReporter(LeafSystem):
         output.SetFromVector(np.array([x, y, 1.0]))
 
     def _calc_pixels(self, context: Context, output: BasicVector) -> None:
-        pixels: Any = self._pixels_cache.Eval(context)
+        pixels: Any = self.get_cache_entry(self._pixels_index).Eval(context)
         output.SetFromVector(pixels)
 
 

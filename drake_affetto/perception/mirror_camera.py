@@ -35,7 +35,7 @@ from pydrake.systems.framework import (
 from pydrake.systems.sensors import CameraInfo, ImageLabel16I, ImageRgba8U
 
 from drake_affetto.common.errors import InputError
-from drake_affetto.common.systems import input_port, output_port
+from drake_affetto.common.systems import input_port, output_port, weakly
 from drake_affetto.geometry.optics import (
     FisheyeCamera,
     MirrorView,
@@ -214,37 +214,38 @@ class MirrorCamera(LeafSystem):
             self.all_parameters_ticket(),
         }
         shape = (self._pinhole.height, self._pinhole.width, 3)
-        self._view_cache = self.DeclareCacheEntry(
+        view = self.DeclareCacheEntry(
             description="view",
             value_producer=ValueProducer(
                 allocate=Value(np.zeros(shape, dtype=np.uint8)).Clone,
-                calc=self._calc_view,
+                calc=weakly(self._calc_view),
             ),
             prerequisites_of_calc=scene,
         )
+        self._view_index = view.cache_index()
         width, height = config.width, config.height
         self.DeclareAbstractOutputPort(
             "color_image",
             Value(ImageRgba8U(width, height, 255)).Clone,
-            self._calc_color_image,
+            weakly(self._calc_color_image),
             scene | {self.time_ticket()},
         )
         self.DeclareAbstractOutputPort(
             "label_image",
             Value(ImageLabel16I(width, height)).Clone,
-            self._calc_label_image,
+            weakly(self._calc_label_image),
             scene,
         )
         self.DeclareAbstractOutputPort(
             "body_pose_in_world",
             Value(RigidTransform()).Clone,
-            self._calc_pose,
+            weakly(self._calc_pose),
             scene,
         )
         self.DeclareAbstractOutputPort(
             "sight",
             Value(CameraSnapshot(np.eye(4))).Clone,
-            self._calc_sight,
+            weakly(self._calc_sight),
             scene,
         )
 
@@ -470,7 +471,7 @@ class MirrorCamera(LeafSystem):
         composite_mirror(part, reflection, mask, mirror.tint, mirror.blur)
 
     def _calc_color_image(self, context: Any, output: Any) -> None:
-        image: Any = self._view_cache.Eval(context)
+        image: Any = self.get_cache_entry(self._view_index).Eval(context)
         if self._remap is not None:
             image = cv2.remap(
                 image,

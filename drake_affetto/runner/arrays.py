@@ -9,7 +9,7 @@ import zlib
 
 import numpy as np
 
-from drake_affetto.common.errors import InputError, require
+from drake_affetto.common.errors import InputError, one_line, require
 
 # What reading an archive of arrays may raise where it is damaged.
 _DAMAGE = (
@@ -62,7 +62,8 @@ def unpack_arrays(data: bytes) -> dict[str, np.ndarray]:
     except InputError:
         raise
     except _DAMAGE as error:
-        raise InputError(str(error) or type(error).__name__) from error
+        message = one_line(error) or type(error).__name__
+        raise InputError(message) from error
 
 
 def _declared_size(file: Any) -> int:

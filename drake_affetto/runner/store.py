@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from drake_affetto.common.errors import InputError, require, short
+from drake_affetto.common.errors import InputError, one_line, require, short
 from drake_affetto.common.fingerprint import text_digest
 from drake_affetto.common.nested import leaves, map_leaves
 from drake_affetto.runner.arrays import pack_arrays, unpack_arrays
@@ -52,6 +52,9 @@ CREATE TABLE IF NOT EXISTS inputs (
     arrays BLOB NOT NULL
 )
 """
+
+# What reading a damaged file may raise.
+_DAMAGE = (sqlite3.Error, UnicodeDecodeError, MemoryError, OverflowError)
 
 # Columns that each table has since version 0.1.0, which had no inputs.
 _COLUMNS = {
@@ -90,7 +93,7 @@ def _object(text: str, where: str) -> dict[str, Any]:
     try:
         plain = json.loads(text)
     except (ValueError, TypeError, RecursionError) as error:
-        raise InputError(f"{where} is damaged: {error}") from error
+        raise InputError(f"{where} is damaged: {one_line(error)}") from error
     require(isinstance(plain, dict), where, short(plain), "an object")
     return plain
 
@@ -201,9 +204,9 @@ class TrialStore:
                 self._db.execute(f"PRAGMA application_id = {_APPLICATION}")
                 self._db.execute(f"PRAGMA user_version = {FORMAT_VERSION}")
             self._db.commit()
-        except sqlite3.Error as error:
+        except _DAMAGE as error:
             raise InputError(
-                f"cannot {verb} trials in {self.path}: {error}"
+                f"cannot {verb} trials in {self.path}: {one_line(error)}"
             ) from error
 
     def _check_format(self, schema: str, path: Path) -> None:
@@ -244,9 +247,9 @@ class TrialStore:
         """Tells what SQLite cannot read in one line that names the file."""
         try:
             yield
-        except (sqlite3.Error, UnicodeDecodeError) as error:
+        except _DAMAGE as error:
             raise InputError(
-                f"cannot read trials in {self.path}: {error}"
+                f"cannot read trials in {self.path}: {one_line(error)}"
             ) from error
 
     def verify(self) -> None:
@@ -258,9 +261,7 @@ class TrialStore:
         with self._reading():
             (found,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
             if found != "ok":
-                raise InputError(
-                    f"{self.path} is damaged: {' '.join(str(found).split())}"
-                )
+                raise InputError(f"{self.path} is damaged: {one_line(found)}")
             keys = self._db.execute("SELECT key FROM trials").fetchall()
         for (key,) in keys:
             self._result(key)
@@ -280,9 +281,9 @@ class TrialStore:
         try:
             return result, unpack_arrays(arrays)
         except InputError as error:
-            raise InputError(f"{where}: its arrays are damaged: {error}") from (
-                error
-            )
+            raise InputError(
+                f"{where}: its arrays are damaged: {one_line(error)}"
+            ) from (error)
 
     def _result(self, key: str) -> tuple[dict[str, Any], bytes, str] | None:
         """Result and packed arrays of a row, and its name in errors."""
@@ -349,12 +350,12 @@ class TrialStore:
                         if isinstance(leaf, np.ndarray)
                     ),
                 )
-        except sqlite3.Error as error:
+        except _DAMAGE as error:
             kept = ""
             with contextlib.suppress(InputError):
                 kept = f"; {len(self)} finished trials are kept"
             raise InputError(
-                f"cannot write to {self.path}: {error}{kept}"
+                f"cannot write to {self.path}: {one_line(error)}{kept}"
             ) from error
 
     def plan(self, label: str, specs: Sequence[Mapping[str, Any]]) -> None:
@@ -369,8 +370,10 @@ class TrialStore:
             with self._db:
                 self._db.execute("DELETE FROM plans WHERE label = ?", (label,))
                 self._db.executemany("INSERT INTO plans VALUES (?, ?, ?)", rows)
-        except sqlite3.Error as error:
-            raise InputError(f"cannot write to {self.path}: {error}") from error
+        except _DAMAGE as error:
+            raise InputError(
+                f"cannot write to {self.path}: {one_line(error)}"
+            ) from error
 
     def outdated(
         self, label: str, specs: Sequence[Mapping[str, Any]]
@@ -446,9 +449,9 @@ class TrialStore:
                         )
             finally:
                 self._db.execute("DETACH DATABASE other")
-        except sqlite3.Error as error:
+        except _DAMAGE as error:
             raise InputError(
-                f"cannot take trials over from {other}: {error}"
+                f"cannot take trials over from {other}: {one_line(error)}"
             ) from error
         return len(self) - before
 

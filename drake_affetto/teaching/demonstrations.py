@@ -45,7 +45,7 @@ from drake_affetto.common.output import atomic_path, write_target
 from drake_affetto.common.typing import Array
 
 FORMAT = "drake_affetto demonstrations"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 
 ROBOT_LOG_JOINTS = (
     "waist_yaw",
@@ -368,14 +368,14 @@ def _opened(
         raise InputError(f"{path} {what}") from error
     with file:
         if mode == "x":
-            file.attrs["format"] = FORMAT
+            file.attrs["format"] = _packed(FORMAT)
             file.attrs["format_version"] = FORMAT_VERSION
-            file.attrs["about"] = (
+            file.attrs["about"] = _packed(
                 "Movements taught to a drumming robot by hand. Each group of "
                 "/demonstrations is one; its datasets name their units."
             )
         try:
-            found = file.attrs.get("format")
+            found = _text(file.attrs.get("format", ""))
             version = int(file.attrs.get("format_version", 0))
         except _DAMAGE as error:
             raise InputError(f"{path} is damaged: {_short(error)}") from error
@@ -400,9 +400,9 @@ def _write(group: h5py.Group, demonstration: Demonstration) -> None:
             chunks=value.shape if value.size else None,
             fletcher32=value.size > 0,
         )
-        dataset.attrs["unit"] = unit
-        dataset.attrs["about"] = about
-    group.attrs["joint_names"] = list(demonstration.joint_names)
+        dataset.attrs["unit"] = _packed(unit)
+        dataset.attrs["about"] = _packed(about)
+    group.attrs["joint_names"] = _packed(demonstration.joint_names)
     for field in (
         "seed",
         "attempt",
@@ -414,9 +414,10 @@ def _write(group: h5py.Group, demonstration: Demonstration) -> None:
     ):
         value = getattr(demonstration, field)
         if value is not None:
-            group.attrs[field] = value
+            text = isinstance(value, str)
+            group.attrs[field] = _packed(value) if text else value
     if demonstration.content:
-        group.attrs["content"] = json.dumps(demonstration.content)
+        group.attrs["content"] = _packed(json.dumps(demonstration.content))
 
 
 def _read(group: h5py.Group) -> Demonstration:
@@ -425,10 +426,6 @@ def _read(group: h5py.Group) -> Demonstration:
         for field in _ARRAYS
     }
     attributes = group.attrs
-    names = [
-        name.decode() if isinstance(name, bytes) else str(name)
-        for name in attributes["joint_names"]
-    ]
     seed = attributes.get("seed")
     reward, max_pull = (
         float(attributes[field]) if field in attributes else None
@@ -436,16 +433,16 @@ def _read(group: h5py.Group) -> Demonstration:
     )
     return Demonstration(
         **arrays,
-        joint_names=tuple(names),
+        joint_names=tuple(map(_text, attributes["joint_names"])),
         seed=None if seed is None else int(seed),
         attempt=int(attributes["attempt"]),
         reward=reward,
         max_pull=max_pull,
         # Files of earlier versions do not have it.
-        teacher=str(attributes.get("teacher", "")),
-        scenario=str(attributes["scenario"]),
-        version=str(attributes["version"]),
-        content=_content(attributes.get("content", "{}")),
+        teacher=_text(attributes.get("teacher", "")),
+        scenario=_text(attributes["scenario"]),
+        version=_text(attributes["version"]),
+        content=_content(_text(attributes.get("content", "{}"))),
     )
 
 
@@ -466,8 +463,26 @@ def _array(group: h5py.Group, field: str) -> Any:
     return dataset[()]
 
 
-def _content(text: Any) -> dict[str, str]:
-    content = json.loads(str(text))
+def _packed(text: str | Sequence[str]) -> Any:
+    """Text, or several, of fixed length.
+
+    HDF5 keeps others apart, without a checksum, and reads on for ever where
+    they are damaged.
+    """
+    several = [text] if isinstance(text, str) else list(text)
+    data = [each.encode() for each in several]
+    length = max(1, *(len(each) for each in data))
+    packed = np.array(data, h5py.string_dtype("utf-8", length))
+    return packed[0] if isinstance(text, str) else packed
+
+
+def _text(value: Any) -> str:
+    """Text of an attribute; files of version 0.1.0 have it as such."""
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
+def _content(text: str) -> dict[str, str]:
+    content = json.loads(text)
     require(isinstance(content, dict), "content", content, "an object")
     return {str(name): str(each) for name, each in content.items()}
 

@@ -7,7 +7,7 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from drake_affetto.common.systems import output_port
+from drake_affetto.common.systems import output_port, weakly
 from drake_affetto.common.typing import Array
 
 
@@ -24,7 +24,7 @@ class HandForce(LeafSystem):
         self.DeclareAbstractOutputPort(
             name="spatial_force",
             alloc=lambda: Value([ExternallyAppliedSpatialForce()]),
-            calc=self._calc_spatial_force,
+            calc=weakly(self._calc_spatial_force),
             prerequisites_of_calc=prerequisites,
         )
         self.DeclareVectorOutputPort(

@@ -73,9 +73,10 @@ class KinestheticTeacher(HandForce):
         joints = [plant.GetJointByName(name) for name in joint_names]
         self._q_index = np.array([j.position_start() for j in joints])
         self._v_index = np.array([j.velocity_start() for j in joints])
-        self._palm = find_frame(plant, palm_frame)
-        self._body = self._palm.body()
-        self._p_BoPalm = self._palm.GetFixedPoseInBodyFrame().translation()
+        palm = find_frame(plant, palm_frame)
+        # Their index, for frames and bodies keep the plant, see `weakly`.
+        self._body_index = palm.body().index()
+        self._p_BoPalm = palm.GetFixedPoseInBodyFrame().translation()
         n = len(joints)
         self._n = n
         self._dt = 1.0 / config.update_rate
@@ -92,7 +93,7 @@ class KinestheticTeacher(HandForce):
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=self._dt, offset_sec=0.0, update=self._update
         )
-        self._declare_outputs(self._body, {self.xd_ticket()})
+        self._declare_outputs(palm.body(), {self.xd_ticket()})
 
     @staticmethod
     def AddToBuilder(
@@ -183,11 +184,12 @@ class KinestheticTeacher(HandForce):
         q = plant.GetPositions(context)
         q[self._q_index] = state[: self._n]
         plant.SetPositions(context, q)
-        X_WB = self._body.EvalPoseInWorld(context)
+        body = self._plant.get_body(self._body_index)
+        X_WB = body.EvalPoseInWorld(context)
         J = plant.CalcJacobianTranslationalVelocity(
             context,
             JacobianWrtVariable.kV,
-            self._body.body_frame(),
+            body.body_frame(),
             self._p_BoPalm,
             world,
             world,

@@ -1,10 +1,18 @@
+import gc
 import inspect
 import pydoc
+import weakref
 
-from pydrake.systems.framework import InputPort, LeafSystem, OutputPort
+from pydrake.common.value import Value
+from pydrake.systems.framework import (
+    InputPort,
+    LeafSystem,
+    OutputPort,
+    ValueProducer,
+)
 import pytest
 
-from drake_affetto.common.systems import input_port, output_port
+from drake_affetto.common.systems import input_port, output_port, weakly
 
 
 class Source(LeafSystem):
@@ -50,3 +58,34 @@ def test_getter_refuses_a_name_that_tells_no_port():
 
         class _(LeafSystem):
             get_blob = output_port("The marker (3).")
+
+
+class Abstract(LeafSystem):
+    """An output and a cache entry that call the system's own methods."""
+
+    def __init__(self):
+        super().__init__()
+        entry = self.DeclareCacheEntry(
+            "seven",
+            ValueProducer(Value(0.0).Clone, weakly(self._calc_entry)),
+            {self.nothing_ticket()},
+        )
+        self._entry = entry.cache_index()
+        self.DeclareAbstractOutputPort(
+            "seven", Value(0.0).Clone, weakly(self._calc)
+        )
+
+    def _calc_entry(self, context, output):
+        output.set_value(7.0)
+
+    def _calc(self, context, output):
+        output.set_value(self.get_cache_entry(self._entry).Eval(context))
+
+
+def test_a_system_that_gives_its_methods_weakly_works_and_goes():
+    dut = Abstract()
+    assert dut.get_output_port(0).Eval(dut.CreateDefaultContext()) == 7.0
+    left = weakref.ref(dut)
+    del dut
+    gc.collect()
+    assert left() is None

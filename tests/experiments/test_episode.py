@@ -1,5 +1,8 @@
 """Single trials on the real station: what each leaves and depends on."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
@@ -94,3 +97,13 @@ def test_the_whole_chain_looks_then_drums(runner, lesson):
     error = recording.joint_state[:n, :8] - replay.joint_state[:n, :8]
     assert np.degrees(np.abs(error)).max() < 5.0
     assert recording.contact_force[:, 0].max() > 0.3
+
+
+def test_a_runner_goes_with_its_last_reference():
+    """With the contexts that it has kept."""
+    one = TrialRunner(load_scenario("drumming"))
+    one.look(np.array([0.235, -0.09]), 1)
+    left = [weakref.ref(each) for each in (one, one.station, one.diagram)]
+    del one
+    gc.collect()
+    assert [each() for each in left] == [None] * 3

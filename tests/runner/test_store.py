@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import random
 import signal
 import sqlite3
 import time
@@ -13,6 +14,7 @@ from drake_affetto.common.errors import InputError
 from drake_affetto.runner.arrays import pack_arrays
 from drake_affetto.runner.store import TrialStore, trial_key
 from drake_affetto.skill.elm import ElmRegressor
+from support import damage
 
 
 def spec(i=0, **more):
@@ -314,3 +316,34 @@ def test_trials_that_a_new_plan_does_not_use_are_counted(tmp_path):
         assert store.outdated("Phase", [spec(i) for i in range(5)]) == (0, {})
         assert store.outdated("Phase", [spec(2)]) == (2, spec(0))
         assert store.outdated("Other", [spec(7)]) == (0, {})
+
+
+@pytest.mark.parametrize("read_only", [False, True])
+def test_no_damage_is_taken_for_a_result(tmp_path, read_only):
+    path = tmp_path / "a.sqlite"
+    filled(path)
+    with TrialStore(path) as store:
+        store._db.execute("PRAGMA journal_mode=DELETE")
+    whole = path.read_bytes()
+    rng = random.Random(1)
+    told = []
+    for _ in range(200):
+        for old in tmp_path.iterdir():
+            old.unlink()
+        path.write_bytes(damage.damaged(whole, rng))
+        try:
+            with TrialStore(path, read_only=read_only) as store:
+                store.verify()
+                for i in range(3):
+                    found = store.get(spec(i))
+                    if found is not None:
+                        assert found[0] == {"reward": 0.5}
+                        np.testing.assert_array_equal(found[1]["x"], range(5))
+                for row in store.rows():
+                    store.spec(row.key)
+                store.phases()
+                store.finished_at()
+        except InputError as error:
+            told.append(str(error))
+    assert len(told) > 50
+    assert all(str(path) in each and "\n" not in each for each in told)

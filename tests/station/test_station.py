@@ -1,5 +1,8 @@
 """The station: wiring, placing, locking, and physics of the whole."""
 
+import gc
+import weakref
+
 import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
@@ -292,3 +295,19 @@ def test_the_seed_of_a_scenario_is_that_of_its_noise():
     first, other, again = seen
     np.testing.assert_array_equal(first, again)
     assert np.mean(first != other) > 0.1
+
+
+@pytest.mark.parametrize("name", ["drumming", "mirror", "robot", "analytic"])
+def test_a_station_goes_with_its_last_reference(name):
+    """All of it: a study of many scenarios would fill the memory."""
+    scenario = load_scenario("mirror" if name == "analytic" else name)
+    if name == "analytic":
+        scenario.camera.renderer = "analytic"
+    station = AffettoStation(scenario)
+    context = station.CreateDefaultContext()
+    port(station, context, "camera.blob_pixels")
+    parts = [station, *station.GetSystems()]
+    left = {part.get_name(): weakref.ref(part) for part in parts}
+    del station, context, parts
+    gc.collect()
+    assert [name for name, part in left.items() if part() is not None] == []

@@ -25,6 +25,7 @@ from drake_affetto.teaching.demonstrations import (
     read_demonstrations,
     write_demonstrations,
 )
+from support import damage
 
 ROOT = Path(__file__).parents[2]
 LOG = ROOT.parent / "shared/data/affetto-logs/kinesthetic_000.csv"
@@ -117,11 +118,11 @@ def test_the_file_tells_what_it_holds(tmp_path):
     path = tmp_path / "taught.h5"
     append_demonstration(path, make())
     with h5py.File(path) as file:
-        assert file.attrs["format"] == "drake_affetto demonstrations"
-        assert file.attrs["format_version"] == 1
-        assert "Movements" in file.attrs["about"]
+        assert file.attrs["format"] == b"drake_affetto demonstrations"
+        assert file.attrs["format_version"] == 2
+        assert b"Movements" in file.attrs["about"]
         group = file["demonstrations/000000"]
-        units = {name: group[name].attrs["unit"] for name in group}
+        units = {name: group[name].attrs["unit"].decode() for name in group}
         assert units == {
             "t": "s",
             "q": "rad",
@@ -131,9 +132,9 @@ def test_the_file_tells_what_it_holds(tmp_path):
             "prototype": "1",
         }
         assert all(group[name].attrs["about"] for name in group)
-        assert list(group.attrs["joint_names"]) == list(JOINTS)
+        assert group.attrs["joint_names"].astype("U").tolist() == list(JOINTS)
         assert group.attrs["seed"] == 0
-        assert group.attrs["scenario"] == "drumming"
+        assert group.attrs["scenario"] == b"drumming"
 
 
 @pytest.mark.parametrize(
@@ -179,7 +180,7 @@ def test_files_of_others_are_refused_and_left_alone(tmp_path):
     newer = tmp_path / "newer.h5"
     append_demonstration(newer, make())
     with h5py.File(newer, "r+") as file:
-        file.attrs["format_version"] = 2
+        file.attrs["format_version"] = 3
     hollow = tmp_path / "hollow.h5"
     append_demonstration(hollow, make())
     with h5py.File(hollow, "r+") as file:
@@ -188,7 +189,7 @@ def test_files_of_others_are_refused_and_left_alone(tmp_path):
         (text, "no HDF5 file"),
         (empty, "empty.h5"),
         (foreign, "not a file of demonstrations"),
-        (newer, "format version 2"),
+        (newer, "format version 3"),
         (hollow, "demonstration 000000"),
         (tmp_path / "none.h5", "existing file"),
         (tmp_path, "existing file"),
@@ -261,7 +262,8 @@ for i in range(1000):
 def test_a_kill_loses_at_most_the_one_in_progress(tmp_path):
     path = tmp_path / "taught.h5"
     script = WRITER.format(tests=str(Path(__file__).parent))
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    places = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
+    environment = {**os.environ, "PYTHONPATH": places}
     dice = random.Random(1)
     written = 0
     for start in (0, 1000, 2000):
@@ -481,3 +483,47 @@ def test_a_link_stays_and_its_target_grows(tmp_path):
     assert link.is_symlink()
     assert len(read_demonstrations(tmp_path / "far/a.h5")) == 1
     assert [each.name for each in (tmp_path / "far").iterdir()] == ["a.h5"]
+
+
+def test_a_file_of_the_first_format_is_read(tmp_path):
+    """Its texts are of any length, where HDF5 keeps these."""
+    path = tmp_path / "a.h5"
+    written = make(scenario="Trommel-Übung", teacher="")
+    append_demonstration(path, written)
+
+    def loosen(_, item):
+        for name, value in dict(item.attrs).items():
+            if isinstance(value, bytes):
+                item.attrs[name] = value.decode()
+            elif getattr(value, "dtype", np.dtype(int)).kind == "S":
+                item.attrs[name] = [each.decode() for each in value]
+
+    with h5py.File(path, "r+") as file:
+        loosen("", file)
+        file.visititems(loosen)
+        file.attrs["format_version"] = 1
+        assert isinstance(file.attrs["format"], str)
+    assert_same(read_demonstrations(path)[0], written)
+    append_demonstration(path, written)
+    assert len(read_demonstrations(path)) == 2
+
+
+def test_no_damage_is_taken_for_a_demonstration(tmp_path):
+    """Nor does reading go on for ever."""
+    path = tmp_path / "a.h5"
+    written = [make(i, content={"values": "1"}) for i in range(3)]
+    write_demonstrations(path, written)
+    whole = path.read_bytes()
+    rng = random.Random(0)
+    told = []
+    for _ in range(200):
+        path.write_bytes(damage.damaged(whole, rng))
+        try:
+            found = read_demonstrations(path)
+        except InputError as error:
+            told.append(str(error))
+        else:
+            for each, before in zip(found, written, strict=True):
+                assert_same(each, before)
+    assert len(told) > 100
+    assert all(str(path) in each and "\n" not in each for each in told)
