@@ -92,9 +92,17 @@ def calibrate(
             the gaze centers the marker, so that its x says nothing).
 
     Raises:
-        InputError: if the marker was seen at fewer than 3 places.
+        InputError: if the marker was seen at fewer than 3 places, or an
+            argument does not fit.
     """
     uv = np.asarray(uv, dtype=float)
+    require(
+        uv.ndim == 2 and uv.shape[1] == 2,
+        "uv",
+        f"an array of shape {uv.shape}",
+        "pixels (n, 2)",
+    )
+    require_range("margin", margin, 0.0, 10.0)
     seen = uv[np.all(np.isfinite(uv), axis=1)]
     if len(seen) < 3:
         raise InputError(
