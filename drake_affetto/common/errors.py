@@ -1,6 +1,7 @@
 """Errors that a user can mend, each told in one line."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+import contextlib
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,6 +34,15 @@ def require(condition: bool, field: str, value: Any, expected: str) -> None:
     """Raises InputError naming `field`, `value` and what was `expected`."""
     if not condition:
         raise InputError(f"{field} is {shown(value)}, expected {expected}")
+
+
+@contextlib.contextmanager
+def naming(where: str) -> Iterator[None]:
+    """Names the whole, a file or a field, in errors about a part of it."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
 
 
 def require_range(

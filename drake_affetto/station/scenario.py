@@ -10,6 +10,7 @@ from pydrake.systems.analysis import SimulatorConfig
 
 from drake_affetto.common.errors import (
     InputError,
+    naming,
     require,
     require_choice,
     require_range,
@@ -255,12 +256,11 @@ class Scenario:
             self.pneumatics.mode,
             "'flow' where the valves are controlled by PIDF (Eq. 7)",
         )
-        load_sound_config(self.sound)
+        with naming(f"{where}.sound"):
+            load_sound_config(self.sound)
         if self.wire or self.hardware:
-            try:
+            with naming(f"{where}.wire"):
                 resolve(self.wire)
-            except InputError as error:
-                raise InputError(f"{where}.wire: {error}") from None
         for i, mirror in enumerate(self.mirrors):
             mirror.check(f"{where}.mirrors[{i}]")
         for field in dataclasses.fields(self):
@@ -374,5 +374,7 @@ def _load(path: Path, seen: tuple[Path, ...]) -> Scenario:
         )
         if base.endswith((".yaml", ".yml")):
             base = path.parent / base
-        defaults = _load(_find(base), (*seen, path))
+        with naming(f"{path.stem}.{_EXTENDS}"):
+            found = _find(base)
+        defaults = _load(found, (*seen, path))
     return typed(Scenario, data, where=path.stem, defaults=defaults)
