@@ -395,9 +395,17 @@ def chamber_volumes(
     """Volumes (n) of the chambers a and b [m³] at the joint angles q, rad.
 
     Raises:
-        InputError: For angles that are not finite, or not (n).
+        InputError: For angles that are not finite, or do not broadcast
+            against (n).
     """
-    q = require_array("q", q, (parameters.shape[1],))
+    q = require_array("q", q)
+    n = parameters.shape[1]
+    require(
+        q.ndim == 0 or n == 1 or q.shape in ((1,), (n,)),
+        "q",
+        f"an array of shape {q.shape}",
+        f"one angle for each of {n} joints",
+    )
     volume_a = parameters[Row.V_A] + parameters[Row.K_A] * (
         q - parameters[Row.Q_LOWER]
     )
