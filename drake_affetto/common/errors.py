@@ -1,6 +1,7 @@
 """Errors that a user can mend, each told in one line."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+import contextlib
 import math
 from pathlib import Path
 import reprlib
@@ -54,6 +55,15 @@ class _Short:
 def short(value: Any) -> Any:
     """What stands in errors for a value that may be a whole file."""
     return _Short(value)
+
+
+@contextlib.contextmanager
+def naming(where: str) -> Iterator[None]:
+    """Names the whole, a file or a field, in errors about a part of it."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
 
 
 def require_range(

@@ -196,10 +196,8 @@ def _is_scalar(schema: type, data: Any) -> bool:
     """Whether `data` is a number or a text, as `schema` says."""
     if isinstance(data, bool) or not isinstance(data, (int, float, str)):
         return False
-    if schema is str:
-        return True
-    if isinstance(data, str):
-        return False
+    if schema is str or isinstance(data, str):
+        return schema is str and isinstance(data, str)
     try:
         number = float(data)
     except OverflowError:

@@ -20,6 +20,7 @@ from drake_affetto.perception.analytic import (
     Occluders,
     completed,
     measured_blob,
+    too_little_seen,
     visible_marker,
 )
 from drake_affetto.perception.blob import Blob, BlobConfig
@@ -171,6 +172,8 @@ class AnalyticBlobSensor(BlobReporter):
                 self._radius,
                 None if index == 0 else sight.mirrors[index - 1].X_WM,
             )
+            if too_little_seen(area, whole_area):
+                return None
             centroid = completed(area, centroid, whole_area, whole, sight.seed)
         image_area = self._model.width * self._model.height
         return measured_blob(

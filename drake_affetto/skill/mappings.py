@@ -21,6 +21,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from drake_affetto.common.errors import require, require_array
 from drake_affetto.common.typing import Array
 
 
@@ -42,8 +43,13 @@ class Domain:
 
     @classmethod
     def of_samples(cls, X: ArrayLike) -> Self:
-        """The domain of the samples X (N, d)."""
-        X = np.asarray(X, dtype=float)
+        """The domain of the samples X (N, d).
+
+        Raises:
+            InputError: For what is no such array of at least one sample.
+        """
+        X = require_array("X", X, (None, None))
+        require(len(X) > 0, "X", "no samples", "at least one")
         centered = X - X.mean(axis=0)
         return cls(
             X.mean(axis=0),
@@ -54,8 +60,13 @@ class Domain:
 
     @classmethod
     def of_range(cls, limits: ArrayLike) -> Self:
-        """The domain of inputs that fill the box limits (d, 2) evenly."""
-        low, high = np.asarray(limits, dtype=float).T
+        """The domain of inputs that fill the box limits (d, 2) evenly.
+
+        Raises:
+            InputError: For what is no such box.
+        """
+        low, high = require_array("limits", limits, (None, 2)).T
+        require(bool(np.all(low < high)), "limits", limits, "low below high")
         return cls(
             (low + high) / 2.0, np.diag((high - low) ** 2 / 12.0), low, high
         )

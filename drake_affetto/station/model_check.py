@@ -3,8 +3,6 @@
 `check_models` builds a plant for that, which takes a fifth of a second.
 """
 
-from collections.abc import Iterator
-import contextlib
 import os
 from typing import Protocol
 
@@ -16,7 +14,7 @@ from pydrake.multibody.plant import (
 )
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from drake_affetto.common.errors import InputError, require
+from drake_affetto.common.errors import InputError, naming, require
 from drake_affetto.common.fingerprint import config_values, text_digest
 from drake_affetto.common.nested import leaves
 from drake_affetto.common.resources import resolve
@@ -96,19 +94,27 @@ def check_models(scenario: ModelScenario, where: str) -> None:
     """
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlant(scenario.plant_config, builder)
-    with _inside(where):
+    with naming(where):
         world.add_world(plant, scenario.world)
-    with _inside(f"{where}.active_joints"):
+    with naming(f"{where}.active_joints"):
         world.weld_inactive(plant, scenario.active_joints)
-    with _inside(where):
+    with naming(where):
         set_joint_damping(plant, scenario.joint_damping)
-    with _inside(f"{where}.world"):
+    with naming(f"{where}.world"):
         try:
             plant.Finalize()
         except RuntimeError as error:
             raise InputError(str(error)) from error
     controlled = scenario.valve_source == "pidf"
-    with _inside(where):
+    for part in ("pneumatics", "control"):
+        config = getattr(scenario, part)
+        if isinstance(config.parameters, str):
+            with naming(f"{where}.{part}.parameters"):
+                resolve(config.parameters)
+        for i, overlay in enumerate(config.overlays):
+            with naming(f"{where}.{part}.overlays[{i}]"):
+                resolve(overlay)
+    with naming(where):
         AddPneumaticDriver(
             PneumaticDriver(
                 joints={
@@ -170,14 +176,5 @@ def check_scene(
     R_WJ = joint.frame_on_parent().CalcPoseInWorld(context).rotation()
     axis = R_WJ.matrix() @ joint.revolute_axis()
     require(abs(axis[2]) > _UPRIGHT, f"{where}.yaw_joint", name, expected)
-    with _inside(where):
+    with naming(where):
         camera.mirrors(camera.GetMyContextFromRoot(root))
-
-
-@contextlib.contextmanager
-def _inside(where: str) -> Iterator[None]:
-    """Names the whole in errors about a part of it."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from error

@@ -10,6 +10,7 @@ from pydrake.systems.analysis import SimulatorConfig
 
 from drake_affetto.common.errors import (
     InputError,
+    naming,
     require,
     require_choice,
     require_range,
@@ -280,12 +281,11 @@ class Scenario:
             self.pneumatics.mode,
             "'flow' where the valves are controlled by PIDF (Eq. 7)",
         )
-        load_sound_config(self.sound)
+        with naming(f"{where}.sound"):
+            load_sound_config(self.sound)
         if self.wire or self.hardware:
-            try:
+            with naming(f"{where}.wire"):
                 resolve(self.wire)
-            except InputError as error:
-                raise InputError(f"{where}.wire: {error}") from None
         for i, mirror in enumerate(self.mirrors):
             mirror.check(f"{where}.mirrors[{i}]")
         for field in dataclasses.fields(self):
@@ -437,6 +437,8 @@ def _load(path: Path, files: list[Path]) -> Scenario:
         )
         if base.endswith((".yaml", ".yml")):
             base = path.parent / base
-        defaults = _load(find_scenario(base), files)
+        with naming(f"{path.stem}.{_EXTENDS}"):
+            found = find_scenario(base)
+        defaults = _load(found, files)
     data = anchored(data, Scenario, path.parent)
     return typed(Scenario, data, where=path.stem, defaults=defaults)

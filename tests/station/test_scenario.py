@@ -85,7 +85,7 @@ def test_drakes_own_configs_are_read(tmp_path):
         ("teaching:\n  lift: {mean: 9.0}", "s.teaching.lift.mean is 9.0"),
         ("a: [1, 2", "is not YAML"),
         ("- 1\n- 2", "holds no mapping"),
-        ("extends: drumning", "no scenario 'drumning'; did you mean"),
+        ("extends: drumning", "s.extends: no scenario 'drumning'; did you"),
         ("extends: s.yaml", "extends itself"),
         ("extends: 4", "s.extends is 4"),
         ("mirrors: 7", "s.mirrors is 7, expected a list"),
@@ -163,6 +163,26 @@ def test_drakes_own_configs_are_read(tmp_path):
         ),
         ("active_joints: [waist_yaw, knee]", "s.active_joints: model affetto"),
         ("joint_damping: {knee: 1.0}", "s: joint_damping: model affetto"),
+        (
+            "joint_damping: {neck_yaw: 1.0}",
+            "s: joint_damping.neck_yaw is 1.0, expected the damping of an act",
+        ),
+        ("sound: nowhere.yaml", "s.sound: no such file: nowhere.yaml"),
+        (
+            "variation: {overlays: [nowhere.yaml]}",
+            "s.variation: no such file: nowhere.yaml",
+        ),
+        (
+            "pneumatics: {overlays: [nowhere.yaml]}",
+            "s.pneumatics.overlays[0]: no such file: nowhere.yaml",
+        ),
+        (
+            "control: {parameters: nowhere.yaml}",
+            "s.control.parameters: no such file: nowhere.yaml",
+        ),
+        ("extends: nowhere.yaml", "s.extends: no such scenario file"),
+        ("sound: 5", "s.sound is 5, expected text"),
+        ("active_joints: [1]", "s.active_joints[0] is 1, expected text"),
         ("joint_damping: {5: 1.0}", "s.joint_damping has the key 5"),
         (
             "world: {frames: {pond: {}}}",
