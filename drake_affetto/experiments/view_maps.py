@@ -34,7 +34,7 @@ CHANGED_VIEWS = (
     "mirror_and_camera",
     "camera_rolled",
     "camera_replaced",
-    "robot_moved",
+    "head_turned",
     "wide_angle",
 )
 REFERENCE = "drumming"

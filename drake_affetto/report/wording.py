@@ -62,7 +62,7 @@ SCENARIOS = {
     "mirror": "mirror",
     "camera_rolled": "camera rolled",
     "camera_replaced": "another camera",
-    "robot_moved": "robot moved",
+    "head_turned": "head turned",
     "mirror_moved": "mirror moved",
     "mirror_and_camera": "mirror and other camera",
     "wide_angle": "wide-angle lens",

@@ -280,7 +280,7 @@ def scenarios(seed=0):
         "camera_rolled": "level",
         "camera_replaced": "transfer",
         "mirror_moved": "relearn",
-        "robot_moved": "unchanged",
+        "head_turned": "unchanged",
     }
     return {
         **head("scenarios", seed),
