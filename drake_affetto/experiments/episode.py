@@ -130,12 +130,12 @@ class _Look:
     """The last search of a runner, and the station at its end.
 
     Attributes:
-        key: Position of the drum and seed of the trial.
+        key: Position of the drum, seed of the trial and pose of the mirror.
         outcome: Outcome of the search.
         end: Context at its end.
     """
 
-    key: tuple[float, float, int]
+    key: tuple[float, float, int, world.FramePose | None]
     outcome: GazeOutcome
     end: Context
 
@@ -205,8 +205,17 @@ class TrialRunner:
         self.meshcat = meshcat
         self._palm_chain = world.serial_chain(self.station.plant, "right_palm")
         self._settled: Context | None = None
+        self._mirror: world.FramePose | None = None
         self._looked: _Look | None = None
         self._taps: list[Array] | None = None
+
+    def place_mirror(self, pose: world.FramePose | None) -> None:
+        """Puts the mirror there in the trials to come; None: as the scenario.
+
+        Args:
+            pose: Pose of the frame `mirror_pose`.
+        """
+        self._mirror = pose
 
     def tap_prototypes(self) -> list[Array]:
         """Prototypes of the drum's sound when a person taps it."""
@@ -379,7 +388,7 @@ class TrialRunner:
             xy: Position of the drum (2,), m.
             seed: Seed of the trial.
         """
-        key = (float(xy[0]), float(xy[1]), seed)
+        key = (float(xy[0]), float(xy[1]), seed, self._mirror)
         if self._looked is None or self._looked.key != key:
             outcome = self.gaze(xy, seed)
             if self._looked is None:
@@ -447,6 +456,8 @@ class TrialRunner:
             self._settled = self.context.Clone()
         self._copy(self._settled, self.context)
         self.station.set_drum_position(self._station_context, xy)
+        if self._mirror is not None:
+            self.station.set_mirror_pose(self._station_context, self._mirror)
         self.station.set_seed(self._station_context, seed)
         self._clear_logs()
         self.simulator.Initialize()

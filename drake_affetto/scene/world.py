@@ -20,7 +20,7 @@ from pydrake.geometry import (
     SceneGraphInspector,
     Sphere,
 )
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import (
     LoadModelDirectives,
     ModelDirectives,
@@ -60,6 +60,7 @@ ACTIVE_JOINTS = (
 """The joints that drum, unless a scenario names others, in their order."""
 
 _PLACEMENT = "drum_placement"
+_MIRROR = "mirror_pose"
 
 
 @dataclasses.dataclass
@@ -396,6 +397,23 @@ def marker_radius(plant: MultibodyPlant, context: Context) -> float:
     return find_marker_radius(plant, query.inspector())
 
 
+def _visual_radius(
+    plant: MultibodyPlant, inspector: SceneGraphInspector, name: str, kind: type
+) -> float:
+    """Radius of the visual geometry that is called as the frame it is at, m."""
+    body = plant.GetFrameByName(name).body()
+    frame = plant.GetBodyFrameIdOrThrow(body.index())
+    for geometry in inspector.GetGeometries(frame, Role.kPerception):
+        shape: Any = inspector.GetShape(geometry)
+        found = inspector.GetName(geometry).rpartition("::")[2]
+        if found == name and isinstance(shape, kind):
+            return float(shape.radius())
+    raise InputError(
+        f"{body.scoped_name()} has no visual {kind.__name__.lower()} named "
+        f"{name!r}"
+    )
+
+
 def find_marker_radius(
     plant: MultibodyPlant, inspector: SceneGraphInspector
 ) -> float:
@@ -404,14 +422,18 @@ def find_marker_radius(
     Raises:
         InputError: If the drum has no visual cylinder named `marker`.
     """
-    body = plant.GetFrameByName("marker").body()
-    frame = plant.GetBodyFrameIdOrThrow(body.index())
-    for geometry in inspector.GetGeometries(frame, Role.kPerception):
-        shape = inspector.GetShape(geometry)
-        name = inspector.GetName(geometry).rpartition("::")[2]
-        if name == "marker" and isinstance(shape, Cylinder):
-            return float(shape.radius())
-    raise InputError("the drum's model has no visual cylinder named 'marker'")
+    return _visual_radius(plant, inspector, "marker", Cylinder)
+
+
+def hand_marker_radius(
+    plant: MultibodyPlant, inspector: SceneGraphInspector
+) -> float:
+    """Radius of the ball on the right hand, m.
+
+    Raises:
+        InputError: If the robot has no visual sphere named `hand_marker`.
+    """
+    return _visual_radius(plant, inspector, "hand_marker", Sphere)
 
 
 def mirror_size(plant: MultibodyPlant, context: Context) -> np.ndarray:
@@ -450,6 +472,37 @@ def set_drum_position(
     frame = plant.GetFrameByName(_PLACEMENT)
     height = table_extents(plant, context)[1][2]
     frame.SetPoseInParentFrame(context, RigidTransform([*place, height]))
+
+
+def set_mirror_pose(
+    plant: MultibodyPlant, context: Context, pose: FramePose
+) -> None:
+    """Puts the mirror elsewhere than the directives have it.
+
+    Args:
+        plant: The finalized plant.
+        context: The plant's context.
+        pose: Pose of the frame `mirror_pose`; its z is the mirror's normal.
+
+    Raises:
+        InputError: For a pose that is out of range.
+    """
+    pose.check("mirror")
+    frame: Any = plant.GetFrameByName(_MIRROR)
+    rotation = RollPitchYaw(np.radians(pose.rotation))
+    frame.SetPoseInParentFrame(
+        context, RigidTransform(rotation, pose.translation)
+    )
+
+
+def get_mirror_pose(plant: MultibodyPlant, context: Context) -> FramePose:
+    """The pose of the frame `mirror_pose`."""
+    frame: Any = plant.GetFrameByName(_MIRROR)
+    X = frame.GetPoseInParentFrame(context)
+    rotation = RollPitchYaw(X.rotation()).vector()
+    return FramePose(
+        X.translation().tolist(), np.degrees(rotation).tolist()
+    )
 
 
 def get_drum_position(plant: MultibodyPlant, context: Context) -> np.ndarray:

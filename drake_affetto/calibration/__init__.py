@@ -1,0 +1,1 @@
+"""What the robot works out of a mirror by itself; arrays alone, no Drake."""
