@@ -18,6 +18,7 @@ class HandConfig:
         blob: How the hand's marker looks.
         space_low: Least x, y, z of the marker's place in the world, m.
         space_high: Greatest, m.
+        aside: Where the drum stands meanwhile, x, y, m.
         joint_margin: Distance from the joints' limits, rad.
         candidates: Number of postures among which the next is chosen.
         looks: Greatest number of looks.
@@ -41,6 +42,9 @@ class HandConfig:
     space_high: list[float] = dataclasses.field(
         default_factory=lambda: [0.36, 0.12, 0.30]
     )
+    aside: list[float] = dataclasses.field(
+        default_factory=lambda: [0.55, -0.29]
+    )
     joint_margin: float = number(0.05, 0.0, 1.0)
     candidates: int = number(150, 10, 10_000)
     looks: int = number(12, 1, 1000)
@@ -60,6 +64,7 @@ class HandConfig:
         self.blob.check(f"{where}.blob")
         for name in ("space_low", "space_high"):
             require_vector(f"{where}.{name}", getattr(self, name), 3, -2, 2)
+        require_vector(f"{where}.aside", self.aside, 2, -2, 2)
         for i, (low, high) in enumerate(
             zip(self.space_low, self.space_high, strict=True)
         ):
@@ -76,18 +81,14 @@ class EllipseConfig:
     """How the drum's marker is measured in the mirror.
 
     Attributes:
-        center_sd: Noise of the ellipse's middle, px.
         moment_sd: Noise of the square root of its second moments, px.
         blur: Standard deviation of the image's own blur, px.
-        images: Number of images that are averaged at each place.
         places: Number of the drum's places that are looked at.
         fewest: Least number of them.
     """
 
-    center_sd: float = number(0.15, 1e-3, 100.0)
-    moment_sd: float = number(0.03, 1e-4, 100.0)
+    moment_sd: float = number(0.04, 1e-4, 100.0)
     blur: float = number(0.289, 0.0, 10.0)
-    images: int = number(5, 1, 1000)
     places: int = number(8, 1, 1000)
     fewest: int = number(3, 1, 1000)
 
@@ -109,7 +110,10 @@ class EarConfig:
         luck: Chance that a stroke which should miss is heard.
         explore: Weight of what a stroke teaches against that it hits.
         strokes: Number of strokes.
-        jitter: Of particles as they are drawn anew, of their deviation.
+        jitter: How far particles are moved as they are drawn anew, as a share
+            of their deviation.
+        beyond: Distance from the workspace at which a drum may still be, m.
+        stray: Share of drums that are taken to be farther away.
     """
 
     particles: int = number(3000, 10, 1_000_000)
@@ -119,7 +123,9 @@ class EarConfig:
     luck: float = number(0.02, 0.0, 0.5)
     explore: float = number(0.3, 0.0, 100.0)
     strokes: int = number(24, 1, 10_000)
-    jitter: float = number(0.3, 0.0, 10.0)
+    jitter: float = number(0.15, 0.0, 0.9)
+    beyond: float = number(0.02, 0.0, 1.0)
+    stray: float = number(0.02, 1e-6, 1.0)
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that does not fit."""

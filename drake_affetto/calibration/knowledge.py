@@ -88,7 +88,6 @@ class RobotKnowledge:
         source_calibration: Of y_img there.
         marker_height: Height of the drum's marker in the world, m.
         marker_radius: Its radius, m.
-        marker_thickness: How far its rim stands up, m.
         zeros: What is added to readings (n,), rad.
     """
 
@@ -104,7 +103,6 @@ class RobotKnowledge:
     source_calibration: BlobCalibration
     marker_height: float
     marker_radius: float
-    marker_thickness: float
     zeros: Array
 
     @property

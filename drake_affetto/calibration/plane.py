@@ -56,18 +56,6 @@ def moved(parameters: Array, reference: Array, other: Array) -> Array:
     return parameters
 
 
-def plane_of_pose(X_WM: Array, reference: Array) -> Array:
-    """Parameters (3,) of a mirror at the pose X_WM (4, 4), z its normal."""
-    n = X_WM[:3, 2]
-    return np.array(
-        [
-            np.arctan2(n[1], n[0]),
-            np.arcsin(np.clip(n[2], -1.0, 1.0)),
-            (reference - X_WM[:3, 3]) @ n,
-        ]
-    )
-
-
 @dataclasses.dataclass
 class PlanePrior:
     """What is taken for granted of the plane: "somewhere on my left".
@@ -179,23 +167,3 @@ class PlaneEstimate:
     def covers(self, parameters: Array) -> bool:
         """Whether a plane (3,) is in the region of 95 %."""
         return self.distance2(parameters) <= CHI2_95
-
-
-def plane_error(
-    parameters: Array, reference: Array, X_WM: Array
-) -> tuple[float, float]:
-    """How wrong a plane (3,) is.
-
-    Args:
-        parameters: The believed plane.
-        reference: Its reference point (3,), m.
-        X_WM: Pose (4, 4) of the mirror, its origin in the middle of the glass.
-
-    Returns:
-        The angle of the normals, rad, and how far the middle of the glass
-        is off the believed plane, m.
-    """
-    n = normals(np.asarray(parameters))
-    cosine = np.clip(n @ X_WM[:3, 2], -1.0, 1.0)
-    off = (X_WM[:3, 3] - reference) @ n + parameters[2]
-    return float(np.arccos(cosine)), float(abs(off))

@@ -259,10 +259,8 @@ class TrialRunner:
         """
         begin = self.settle(xy, seed)
         # The gaze alone: no movement starts within any trial's time.
-        self.station.policy.set_policy_parameters(
-            self._sub(self.station.policy),
-            np.zeros(self.station.num_joints * self.dmp.n_basis),
-            begin + 1e6,
+        self.play(
+            np.zeros(self.station.num_joints * self.dmp.n_basis), begin + 1e6
         )
         self._enable_gaze()
         outcome = self._wait_for_gaze(begin, on_frame)
@@ -342,12 +340,15 @@ class TrialRunner:
             theta: Parameters θ of the movement (n·K,).
             seed: Seed of the microphone's noise and the robot's variation.
         """
-        begin = self.settle(xy, seed)
-        start = begin + self.scenario.policy.delay
+        start = self.settle(xy, seed) + self.scenario.policy.delay
+        self.play(theta, start)
+        return self._record(start, seed)
+
+    def play(self, theta: Array, start: float) -> None:
+        """Has the movement θ (n·K,) begin at the time `start`, s."""
         self.station.policy.set_policy_parameters(
             self._sub(self.station.policy), theta, start
         )
-        return self._record(start, seed)
 
     def drum(
         self, xy: Array, regressor: Regressor, seed: int

@@ -177,12 +177,15 @@ class Blob:
         u, v: centroid [pixels].
         area: area [pixels²], partly covered pixels counted by their part.
         confidence: from 0 to 1: how well hue, shape and size fit.
+        moments: variances and covariance of its pixels' places along u, u and
+            v, and v [pixels²]; zeros where they were not measured.
     """
 
     u: float
     v: float
     area: float
     confidence: float
+    moments: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 # Rims of fewer pixels do not tell an ellipse from another [pixels²].
@@ -453,11 +456,15 @@ def _complete(
     shift = float(np.linalg.norm(middle - [u, v]))
     if shift > max(size):
         return blob
+    # Of a filled ellipse; the half pixel is that of the size above.
+    inner = np.linalg.inv(shape) / 4.0
+    grown = inner * (whole / (math.pi * 4.0 * math.sqrt(np.linalg.det(inner))))
     return Blob(
         float(middle[0]),
         float(middle[1]),
         area,
         blob.confidence * min(1.0, seen),
+        (float(grown[0, 0]), float(grown[0, 1]), float(grown[1, 1])),
     )
 
 
@@ -513,7 +520,7 @@ def _judge(
         return None
     shape = min(1.0, max(0.0, 1.0 - 4.0 * abs(1.0 - fill)))
     size = min(1.0, area / (2.0 * config.min_area))
-    return Blob(u, v, area, 0.2 + 0.8 * shape * size)
+    return Blob(u, v, area, 0.2 + 0.8 * shape * size, (xx, xy, yy))
 
 
 def _simple_blobs(

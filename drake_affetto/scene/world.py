@@ -397,23 +397,6 @@ def marker_radius(plant: MultibodyPlant, context: Context) -> float:
     return find_marker_radius(plant, query.inspector())
 
 
-def _visual_radius(
-    plant: MultibodyPlant, inspector: SceneGraphInspector, name: str, kind: type
-) -> float:
-    """Radius of the visual geometry that is called as the frame it is at, m."""
-    body = plant.GetFrameByName(name).body()
-    frame = plant.GetBodyFrameIdOrThrow(body.index())
-    for geometry in inspector.GetGeometries(frame, Role.kPerception):
-        shape: Any = inspector.GetShape(geometry)
-        found = inspector.GetName(geometry).rpartition("::")[2]
-        if found == name and isinstance(shape, kind):
-            return float(shape.radius())
-    raise InputError(
-        f"{body.scoped_name()} has no visual {kind.__name__.lower()} named "
-        f"{name!r}"
-    )
-
-
 def find_marker_radius(
     plant: MultibodyPlant, inspector: SceneGraphInspector
 ) -> float:
@@ -422,18 +405,14 @@ def find_marker_radius(
     Raises:
         InputError: If the drum has no visual cylinder named `marker`.
     """
-    return _visual_radius(plant, inspector, "marker", Cylinder)
-
-
-def hand_marker_radius(
-    plant: MultibodyPlant, inspector: SceneGraphInspector
-) -> float:
-    """Radius of the ball on the right hand, m.
-
-    Raises:
-        InputError: If the robot has no visual sphere named `hand_marker`.
-    """
-    return _visual_radius(plant, inspector, "hand_marker", Sphere)
+    body = plant.GetFrameByName("marker").body()
+    frame = plant.GetBodyFrameIdOrThrow(body.index())
+    for geometry in inspector.GetGeometries(frame, Role.kPerception):
+        shape = inspector.GetShape(geometry)
+        name = inspector.GetName(geometry).rpartition("::")[2]
+        if name == "marker" and isinstance(shape, Cylinder):
+            return float(shape.radius())
+    raise InputError("the drum's model has no visual cylinder named 'marker'")
 
 
 def mirror_size(plant: MultibodyPlant, context: Context) -> np.ndarray:
