@@ -213,9 +213,7 @@ class PlaneBelief:
         noise = self._rng.multivariate_normal(
             np.zeros(3), jitter**2 * estimate.covariance, count
         )
-        self.planes = (
-            pull * planes + (1.0 - pull) * estimate.parameters + noise
-        )
+        self.planes = pull * planes + (1.0 - pull) * estimate.parameters + noise
         self.planes[:, 2] = np.maximum(self.planes[:, 2], 0.01)
         self.weights = np.full(count, 1.0 / count)
 

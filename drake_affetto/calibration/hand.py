@@ -17,7 +17,6 @@ from drake_affetto.calibration.config import HandConfig
 from drake_affetto.calibration.knowledge import (
     KnowledgeErrors,
     RobotKnowledge,
-    in_image,
 )
 from drake_affetto.calibration.plane import (
     CalibrationFailure,
@@ -35,16 +34,6 @@ _DRAWN, _STARTS = 3000, 4
 _COARSE = 40.0
 # About how far the plane moves in a step of a search.
 _SCALE = np.array([0.1, 0.1, 0.05])
-# Looks with which the plane is guessed, to choose the next posture by.
-_FEWEST_TO_CHOOSE = 3
-# Planes that are still possible, for the first choices; noise of an image
-# among so few, px, and the share of images that are something else.
-_PLANES, _WIDE, _ODD = 6000, 15.0, 0.05
-# How much an image that should show the hand and does not speaks against a
-# plane: the glass may end before.
-_ABSENT = 0.4
-# The hand is moved on by so much, at least, while little is known, m.
-_APART = 0.06
 # Steps of numerical derivatives, of the plane and of a correction.
 _STEP = 1e-5
 # Corrections that are known exactly are not sought.
@@ -83,8 +72,16 @@ class HandEstimate:
     correction: Array
 
 
-class _Problem:
-    """The residuals of plane and correction, as one vector of unknowns."""
+class HandProblem:
+    """Where the hand shows, by a plane and a correction of the model.
+
+    The unknowns (P,) are the plane's three parameters, then the correction's
+    numbers that are not known exactly, each in units of its deviation.
+
+    Attributes:
+        knowledge: The robot's model of itself.
+        reference: Reference point of planes (3,), m: where its eye is.
+    """
 
     def __init__(
         self,
@@ -103,9 +100,11 @@ class _Problem:
 
     @property
     def size(self) -> int:
+        """P."""
         return 3 + len(self._sought)
 
     def correction(self, unknowns: Array) -> Array:
+        """The correction of the model in unknowns (P,)."""
         correction = np.zeros(self.knowledge.corrections)
         correction[self._sought] = unknowns[3:] * self._deviation
         return correction
@@ -167,7 +166,7 @@ def estimate_from_hand(
             message says what is missing.
     """
     readings, pixels = _seen(looks, config)
-    problem = _Problem(knowledge, errors, prior, config.pixel_sd)
+    problem = HandProblem(knowledge, errors, prior, config.pixel_sd)
     coarse = _robust_plane(problem, readings, pixels)
     unknowns = np.concatenate([coarse, np.zeros(problem.size - 3)])
     used = np.ones(len(pixels), dtype=bool)
@@ -210,7 +209,7 @@ def estimate_from_hand(
 
 
 def _fit(
-    problem: _Problem,
+    problem: HandProblem,
     readings: Array,
     pixels: Array,
     start: Array,
@@ -228,9 +227,7 @@ def _fit(
     ).x
 
 
-def _seen(
-    looks: Sequence[HandLook], config: HandConfig
-) -> tuple[Array, Array]:
+def _seen(looks: Sequence[HandLook], config: HandConfig) -> tuple[Array, Array]:
     """Readings (m, n) and pixels (m, 2) of the looks that show the marker."""
     seen = [look for look in looks if look.pixel is not None]
     if not seen:
@@ -264,7 +261,9 @@ def _require_spread(
         )
 
 
-def _robust_plane(problem: _Problem, readings: Array, pixels: Array) -> Array:
+def _robust_plane(
+    problem: HandProblem, readings: Array, pixels: Array
+) -> Array:
     """The plane alone (3,) on which most looks agree."""
     hand = problem.knowledge.hand(readings)
     X_WC = problem.knowledge.eye(readings)
@@ -295,187 +294,3 @@ def _robust_plane(problem: _Problem, readings: Array, pixels: Array) -> Array:
         for i in order[:_STARTS]
     ]
     return min(fits, key=lambda fit: fit.cost).x
-
-
-class PostureChooser:
-    """Chooses the posture of the next look at the hand.
-
-    Candidates hold the trunk still and the hand within a box, out of the
-    direct view. While the plane is unknown, what counts is whether the hand
-    would show in the mirror under the planes that are still possible; then
-    also how much a look there would tell of the plane (least determinant of
-    its covariance).
-    """
-
-    def __init__(
-        self,
-        knowledge: RobotKnowledge,
-        errors: KnowledgeErrors,
-        prior: PlanePrior,
-        config: HandConfig,
-        rng: np.random.Generator,
-    ) -> None:
-        """Draws the candidates.
-
-        Raises:
-            CalibrationFailure: If no posture keeps the hand in the box.
-        """
-        self._knowledge, self._errors = knowledge, errors
-        self._config, self._prior = config, prior
-        self._problem = _Problem(knowledge, errors, prior, config.pixel_sd)
-        self.candidates = _candidates(knowledge, config, rng)
-        self._hand = knowledge.hand(self.candidates)
-        self._planes = prior.draw(_PLANES, rng)
-        self._free = np.ones(len(self.candidates), dtype=bool)
-
-    def next(self, looks: Sequence[HandLook]) -> Array:
-        """The next posture (n,), rad, after the looks until now."""
-        estimate = self._provisional(looks)
-        if estimate is None:
-            score = self._chance_by_planes(looks)
-            # Far from where the hand has been seen already.
-            if looks:
-                been = self._knowledge.hand(
-                    np.array([look.readings for look in looks])
-                )
-                apart = np.linalg.norm(
-                    self._hand[:, None] - been, axis=-1
-                ).min(axis=1)
-                score = score * np.minimum(apart / _APART, 1.0)
-        else:
-            score = self._worth(looks, estimate)
-        score = np.where(self._free, score, -np.inf)
-        best = int(np.argmax(score))
-        self._free[best] = False
-        return self.candidates[best]
-
-    def _provisional(self, looks: Sequence[HandLook]) -> HandEstimate | None:
-        """What the looks tell, however little, to choose the next one by."""
-        config = dataclasses.replace(
-            self._config,
-            fewest=_FEWEST_TO_CHOOSE,
-            spread=0.0,
-            angle_limit=np.inf,
-            distance_limit=np.inf,
-        )
-        try:
-            return estimate_from_hand(
-                self._knowledge, self._errors, looks, self._prior, config
-            )
-        except CalibrationFailure:
-            return None
-
-    def _chance_by_planes(self, looks: Sequence[HandLook]) -> Array:
-        """(m,), in how many of the possible planes the hand would show."""
-        robot, reference = self._knowledge, self._problem.reference
-        log = np.zeros(len(self._planes))
-        for look in looks:
-            image = reflect(self._planes, reference, robot.hand(look.readings))
-            uv = robot.pixels(robot.eye(look.readings), image)
-            if look.pixel is None:
-                log += np.log(_ABSENT) * robot.camera.inside(uv)
-            else:
-                off = np.nan_to_num(uv - look.pixel, nan=1e3)
-                square = np.sum((off / _WIDE) ** 2, axis=-1)
-                log += np.log(_ODD + np.exp(-0.5 * square))
-        weights = np.exp(log - log.max())
-        likely = np.argsort(-weights)[:200]
-        weights = weights[likely] / weights[likely].sum()
-        X_WC = robot.eye(self.candidates)
-        image = reflect(self._planes[likely, None], reference, self._hand)
-        uv = robot.pixels(X_WC, image)
-        shows = robot.camera.inside(uv, 10.0) * self._near(
-            looks, np.nan_to_num(uv, nan=1e4), self._planes[likely]
-        )
-        return weights @ shows
-
-    def _near(
-        self, looks: Sequence[HandLook], uv: Array, planes: Array
-    ) -> Array:
-        """Chance (..., m) that the marker shows at uv, by past looks.
-
-        Args:
-            looks: Past looks.
-            uv: Images (..., m, 2), px.
-            planes: Planes (..., 3) by which looks that do not show the marker
-                should have done so.
-        """
-        robot = self._knowledge
-        yes = np.full(uv.shape[:-1], 0.6)
-        no = np.full(uv.shape[:-1], 0.4)
-        for look in looks:
-            if look.pixel is None:
-                image = reflect(
-                    planes, self._problem.reference, robot.hand(look.readings)
-                )
-                at = robot.pixels(robot.eye(look.readings), image)
-                at = np.nan_to_num(at, nan=-1e4)[..., None, :]
-            else:
-                at = look.pixel
-            square = np.sum((uv - at) ** 2, axis=-1)
-            near = np.exp(-0.5 * square / self._config.visible_width**2)
-            if look.pixel is None:
-                no += 2.0 * near
-            else:
-                yes += near
-        return yes / (yes + no)
-
-    def _worth(
-        self, looks: Sequence[HandLook], estimate: HandEstimate
-    ) -> Array:
-        """(m,): chance to see the hand times what it would tell."""
-        uv = _expected(estimate, self.candidates)
-        inside = self._knowledge.camera.inside(uv, 8.0)
-        chance = inside * self._near(looks, uv, estimate.plane.parameters)
-        unknowns = np.concatenate(
-            [
-                estimate.plane.parameters,
-                np.zeros(self._problem.size - 3),
-            ]
-        )
-        J = self._problem.jacobian(unknowns, self.candidates)
-        information = estimate.information + np.swapaxes(J, 1, 2) @ J
-        plane = np.linalg.inv(information)[:, :3, :3]
-        before = np.linalg.inv(estimate.information)[:3, :3]
-        gain = np.linalg.slogdet(before)[1] - np.linalg.slogdet(plane)[1]
-        return chance * gain
-
-
-def _expected(estimate: HandEstimate, readings: Array) -> Array:
-    """Pixels (m, 2) at which the hand should show at readings (m, n)."""
-    robot = estimate.knowledge
-    image = reflect(
-        estimate.plane.parameters,
-        estimate.plane.reference,
-        robot.hand(readings),
-    )
-    uv = robot.pixels(robot.eye(readings), image)
-    return np.nan_to_num(uv, nan=1e4)
-
-
-def _candidates(
-    knowledge: RobotKnowledge, config: HandConfig, rng: np.random.Generator
-) -> Array:
-    """Postures (m, n) with the hand in the box and out of the direct view."""
-    chain = knowledge.hand_chain
-    names = list(chain.names)
-    trunk = set(knowledge.eye_chain.names)
-    drawn = np.tile(knowledge.posture, (40 * config.candidates, 1))
-    for i, name in enumerate(knowledge.joints):
-        if name in trunk or name not in names:
-            continue
-        k = names.index(name)
-        low = chain.lower[k] + config.joint_margin
-        high = chain.upper[k] - config.joint_margin
-        drawn[:, i] = rng.uniform(low, high, len(drawn))
-    hand = knowledge.hand(drawn)
-    good = np.all(
-        (hand >= config.space_low) & (hand <= config.space_high), axis=1
-    ) & ~in_image(knowledge, drawn, config.clear)
-    drawn = drawn[good][: config.candidates]
-    if len(drawn) == 0:
-        raise CalibrationFailure(
-            f"no posture brings the hand's marker between {config.space_low} "
-            f"and {config.space_high} m and keeps it out of the direct view"
-        )
-    return drawn

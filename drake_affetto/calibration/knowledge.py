@@ -145,9 +145,7 @@ class RobotKnowledge:
     def pixels(self, X_WC: Array, p_W: Array) -> Array:
         """Pixels (..., 2) of points p_W (..., 3), seen from (..., 4, 4)."""
         R, p = X_WC[..., :3, :3], X_WC[..., :3, 3]
-        return self.camera.project(
-            np.einsum("...ji,...j->...i", R, p_W - p)
-        )
+        return self.camera.project(np.einsum("...ji,...j->...i", R, p_W - p))
 
     @property
     def eye_position(self) -> Array:
@@ -204,5 +202,3 @@ def in_image(
     X_WC = knowledge.eye(readings)
     uv = knowledge.pixels(X_WC, knowledge.hand(readings))
     return knowledge.camera.inside(uv, -margin)
-
-

@@ -89,9 +89,7 @@ class PlanePrior:
     @property
     def deviation(self) -> Array:
         """(3,)."""
-        return np.array(
-            [self.azimuth_sd, self.elevation_sd, self.distance_sd]
-        )
+        return np.array([self.azimuth_sd, self.elevation_sd, self.distance_sd])
 
     def draw(self, count: int, rng: np.random.Generator) -> Array:
         """Planes (count, 3); none of them is behind the camera."""

@@ -24,7 +24,9 @@ _IMAGES = (0.62, 0.66, 0.70)
 _POINTS = 121
 
 
-def way_to(start: Array, posture: Array, duration: float) -> tuple[Array, Array]:
+def way_to(
+    start: Array, posture: Array, duration: float
+) -> tuple[Array, Array]:
     """A smooth way to a posture, a rest there, and back.
 
     Args:

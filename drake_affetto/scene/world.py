@@ -479,9 +479,7 @@ def get_mirror_pose(plant: MultibodyPlant, context: Context) -> FramePose:
     frame: Any = plant.GetFrameByName(_MIRROR)
     X = frame.GetPoseInParentFrame(context)
     rotation = RollPitchYaw(X.rotation()).vector()
-    return FramePose(
-        X.translation().tolist(), np.degrees(rotation).tolist()
-    )
+    return FramePose(X.translation().tolist(), np.degrees(rotation).tolist())
 
 
 def get_drum_position(plant: MultibodyPlant, context: Context) -> np.ndarray:

@@ -13,6 +13,9 @@ from drake_affetto.experiments.results.rates import (
     Position,
     SuccessRate,
 )
+from drake_affetto.experiments.results.self_calibration import (
+    SelfCalibrationResults,
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -125,6 +128,8 @@ class MirrorResults(StudyResults):
         comparisons: Paired tests of the schemes.
         map: The map of the first repeat; None if no scheme found one.
         chance: Success of the best constant stroke, played blind.
+        self_calibration: How the robot finds the mirror by itself; None if it
+            was not tried.
     """
 
     KIND: ClassVar[str] = "mirror"
@@ -141,9 +146,12 @@ class MirrorResults(StudyResults):
     comparisons: list[SchemeComparisonRow]
     map: TransferMap | None = None
     chance: SuccessRate | None = None
+    self_calibration: SelfCalibrationResults | None = None
 
     def check(self, where: str) -> None:
         """Raises InputError where parts do not fit each other."""
+        if self.self_calibration is not None:
+            self.self_calibration.check(f"{where}self_calibration")
         for name, cells in self.schemes.items():
             for samples in self.samples:
                 if samples not in cells:
