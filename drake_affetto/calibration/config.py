@@ -109,7 +109,6 @@ class EarConfig:
         surest: Greatest chance that a stroke is heard.
         luck: Chance that a stroke which should miss is heard.
         explore: Weight of what a stroke teaches against that it hits.
-        strokes: Number of strokes.
         jitter: How far particles are moved as they are drawn anew, as a share
             of their deviation.
         beyond: Distance from the workspace at which a drum may still be, m.
@@ -117,12 +116,11 @@ class EarConfig:
     """
 
     particles: int = number(3000, 10, 1_000_000)
-    reach: float = number(0.045, 0.001, 1.0)
-    softness: float = number(0.006, 1e-4, 1.0)
-    surest: float = number(0.97, 0.5, 1.0)
+    reach: float = number(0.05, 0.001, 1.0)
+    softness: float = number(0.008, 1e-4, 1.0)
+    surest: float = number(0.92, 0.5, 1.0)
     luck: float = number(0.02, 0.0, 0.5)
     explore: float = number(0.3, 0.0, 100.0)
-    strokes: int = number(24, 1, 10_000)
     jitter: float = number(0.15, 0.0, 0.9)
     beyond: float = number(0.02, 0.0, 1.0)
     stray: float = number(0.02, 1e-6, 1.0)

@@ -4,7 +4,7 @@ Beside the robot that finds the mirror by itself drum schemes that were given
 demonstrations before the same mirror, at the same positions.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 import copy
 import dataclasses
 from typing import Any
@@ -105,10 +105,7 @@ def run_self_calibration(
     _require_some(hand)
     ellipse = study.by_ellipse()
     _require_some(ellipse)
-    by_ear = [
-        _listen(study, start, study.first_beliefs(start, ellipse))
-        for start in LATE
-    ]
+    by_ear = _listen(study, ellipse)
     heard = _from_ear(study, by_ear[-1])
     methods = {"hand": hand, "ellipse": ellipse, "ear": heard}
     pools = _demonstrate(study)
@@ -154,19 +151,23 @@ def _require_some(found: Mapping[int, Calibrated]) -> None:
 
 
 def _listen(
-    study: SelfCalibration, start: str, beliefs: dict[int, PlaneBelief]
-) -> Strokes:
-    """Strokes at drums seen in the mirror; each is heard or not."""
-    low, high = LATE[start]
-    first = copy.deepcopy(beliefs)
+    study: SelfCalibration, ellipse: Mapping[int, Calibrated]
+) -> list[Strokes]:
+    """Strokes at drums seen in the mirror; each is heard or not.
+
+    The same drums serve for each belief with which the robot may begin, and
+    for strokes by these first beliefs, from which nothing is learned.
+    """
+    courses = [
+        _Course(study, start, study.first_beliefs(start, ellipse))
+        for start in LATE
+    ]
+    count = max(high for _, high in LATE.values())
     places = {
-        each.number: study.positions(max(LATE["prior"]), _STROKES, each.number)
+        each.number: study.positions(count, _STROKES, each.number)
         for each in study.repeats
     }
-    heard = np.zeros((len(study.repeats), high), dtype=bool)
-    chance = np.zeros((len(study.repeats), high - low + 1), dtype=bool)
-    steps = [(0, _shown(beliefs[0]))]
-    for k in range(high):
+    for k in range(count):
         drums = {
             each.number: (
                 each.mirror,
@@ -176,41 +177,82 @@ def _listen(
             for each in study.repeats
         }
         gazes = study.look_at(f"Looking for stroke {k + 1}", drums)
+        # Drum by drum: strokes at one drum share the search.
         strokes = {
-            i: _stroke(beliefs[i], gaze)
+            key: stroke
             for i, gaze in gazes.items()
             if gaze.found
+            for course in courses
+            for key, stroke in course.strokes(i, k, np.array(gaze.tau))
         }
-        specs: dict[Any, Any] = {
-            i: _spec(study, i, drums[i], gazes[i], stroke)
-            for i, stroke in strokes.items()
-        }
-        if k + 1 >= low:
-            specs |= {
-                (i, "chance"): _spec(
-                    study,
-                    i,
-                    drums[i],
-                    gazes[i],
-                    first[i].choose(np.array(gazes[i].tau), 0.0),
-                )
-                for i in strokes
-            }
-        struck = study.strike(f"Striking by ear, {k + 1}, {start}", specs)
-        for i, stroke in strokes.items():
-            heard[i, k] = _success(struck[i])
-            beliefs[i].hear(np.array(gazes[i].tau), stroke, bool(heard[i, k]))
-            if k + 1 >= low:
-                chance[i, k + 1 - low] = _success(struck[i, "chance"])
-        if k + 1 in _SHOWN:
-            steps.append((k + 1, _shown(beliefs[0])))
-    return Strokes(start, heard, chance, beliefs, steps)
+        struck = study.strike(
+            f"Striking by ear, {k + 1}",
+            {
+                key: _spec(study, key[0], drums[key[0]], gazes[key[0]], stroke)
+                for key, stroke in strokes.items()
+            },
+        )
+        for key, stroke in strokes.items():
+            i, start, learns = key
+            course = next(each for each in courses if each.start == start)
+            tau = np.array(gazes[i].tau)
+            course.take_in(i, k, tau, stroke, learns, _success(struck[key]))
+    return [course.result() for course in courses]
 
 
-def _stroke(belief: PlaneBelief, gaze: GazeResult) -> Stroke:
-    tau = np.array(gaze.tau)
-    belief.see(tau)
-    return belief.choose(tau)
+class _Course:
+    """Strokes by ear that begin with one kind of belief."""
+
+    def __init__(
+        self,
+        study: SelfCalibration,
+        start: str,
+        beliefs: dict[int, PlaneBelief],
+    ) -> None:
+        self.start, self._beliefs = start, beliefs
+        self._first = copy.deepcopy(beliefs)
+        self._low, self._high = LATE[start]
+        repeats = len(study.repeats)
+        self._heard = np.zeros((repeats, self._high), dtype=bool)
+        late = self._high - self._low + 1
+        self._chance = np.zeros((repeats, late), dtype=bool)
+        self._steps = [(0, _shown(beliefs[0]))]
+
+    def strokes(
+        self, i: int, k: int, tau: Array
+    ) -> Iterator[tuple[tuple[int, str, bool], Stroke]]:
+        """Strokes of repeat i at its drum k, with whether they teach."""
+        if k >= self._high:
+            return
+        belief = self._beliefs[i]
+        belief.see(tau)
+        yield (i, self.start, True), belief.choose(tau)
+        if k + 1 >= self._low:
+            yield (i, self.start, False), self._first[i].choose(tau, 0.0)
+
+    def take_in(
+        self,
+        i: int,
+        k: int,
+        tau: Array,
+        stroke: Stroke,
+        learns: bool,
+        heard: bool,
+    ) -> None:
+        """Takes in whether a stroke was heard."""
+        if not learns:
+            self._chance[i, k + 1 - self._low] = heard
+            return
+        self._heard[i, k] = heard
+        self._beliefs[i].hear(tau, stroke, heard)
+        if i == 0 and k + 1 in _SHOWN:
+            self._steps.append((k + 1, _shown(self._beliefs[0])))
+
+    def result(self) -> Strokes:
+        """All strokes."""
+        return Strokes(
+            self.start, self._heard, self._chance, self._beliefs, self._steps
+        )
 
 
 def _spec(
