@@ -22,6 +22,7 @@ ORDER = [
     {"geometry"},
     {"scene"},
     {"perception"},
+    {"calibration"},
     {"skill"},
     {"motion"},
     {"control"},
@@ -40,7 +41,7 @@ ORDER = [
     {"cli"},
 ]
 RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
-STAGES = [name for names in ORDER[1:11] for name in names]
+STAGES = [name for names in ORDER[1:12] for name in names]
 
 # The mathematics, which must also serve who has no Drake. The test adds to
 # them every module of a stage that does not import Drake in its own text.

@@ -14,12 +14,7 @@ from scipy.special import expit
 
 from drake_affetto.calibration.config import EarConfig
 from drake_affetto.calibration.knowledge import RobotKnowledge
-from drake_affetto.calibration.plane import (
-    PlaneEstimate,
-    PlanePrior,
-    normals,
-    reflect,
-)
+from drake_affetto.calibration.plane import PlaneEstimate, PlanePrior
 from drake_affetto.common.typing import Array
 from drake_affetto.geometry.region import grid_inside, inside_polygon
 
@@ -72,7 +67,7 @@ class PlaneBelief:
         self._workspace = np.asarray(workspace, dtype=float)
         self._config, self._rng = config, rng
         self._optical = knowledge.optical_map()
-        self._eye = knowledge.eye(knowledge.posture)
+        self._reference = knowledge.eye_position
         self._grid = grid_inside(self._workspace, _AIMS)
         middle = self._workspace.mean(axis=0)
         away = self._workspace - middle
@@ -116,27 +111,15 @@ class PlaneBelief:
         covariance = (self.weights[:, None] * off).T @ off
         # A cloud that has shrunk to a point still has a covariance.
         covariance += 1e-12 * np.eye(3)
-        return PlaneEstimate(mean, covariance, self._eye[:3, 3])
+        return PlaneEstimate(mean, covariance, self._reference)
 
     def places(self, tau: Array) -> Array:
         """Where the drum seen at τ̂ (2,) is by each plane: (N, 2), m.
 
         NaN by planes in which it would be seen nowhere on the table.
         """
-        pixel = self._optical.target_calibration.pixels(np.asarray(tau))
-        ray = self._eye[:3, :3] @ self.knowledge.camera.direction(pixel)
-        n = normals(self.planes)
-        origin = reflect(self.planes, self._eye[:3, 3], self._eye[:3, 3])
-        direction = ray - 2.0 * (n @ ray)[:, None] * n
-        with np.errstate(divide="ignore", invalid="ignore"):
-            way = (self.knowledge.marker_height - origin[:, 2]) / direction[
-                :, 2
-            ]
-            place = origin[:, :2] + way[:, None] * direction[:, :2]
-        # The light comes from the mirror, towards which the eye looks.
-        behind = (n @ ray >= 0.0) | ~(way > 0.0)
-        place[behind] = np.nan
-        return place
+        pixel = self.knowledge.calibration.pixels(np.asarray(tau))
+        return self.knowledge.places(self.planes, self._reference, pixel)
 
     def see(self, tau: Array) -> None:
         """Takes in that a drum is seen at τ̂ (2,): it is in the workspace."""

@@ -22,7 +22,6 @@ from drake_affetto.calibration.plane import (
     CalibrationFailure,
     PlaneEstimate,
     PlanePrior,
-    moved,
     reflect,
 )
 from drake_affetto.common.typing import Array
@@ -31,7 +30,6 @@ from drake_affetto.geometry.optics import (
     invert_pose,
     transform_points,
 )
-from drake_affetto.perception.optical_map import OpticalMap
 
 # From how many planes of the prior the search may begin, and does begin.
 _DRAWN, _STARTS = 200, 4
@@ -71,31 +69,31 @@ def shape_features(moments: Array) -> Array:
 
 
 def polygon_moments(uv: Array) -> tuple[Array, Array]:
-    """Centroid (2,) and second moments (3,) of a simple polygon (n, 2).
+    """Centroids (..., 2) and second moments (..., 3) of polygons (..., n, 2).
 
     The moments are variances and covariance about the centroid: along u, u
     and v, and v. By Green's theorem, as the area.
     """
-    origin = uv.mean(axis=0)
+    origin = uv.mean(axis=-2, keepdims=True)
     a = uv - origin
-    b = np.roll(a, -1, axis=0)
-    cross = a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]
-    area = 0.5 * cross.sum()
-    centroid = (cross @ (a + b)) / (6.0 * area)
-    square = (cross @ (a * a + a * b + b * b)) / (12.0 * area)
-    mixed = (
-        cross
-        @ (
-            a[:, 0] * b[:, 1]
-            + 2.0 * a[:, 0] * a[:, 1]
-            + 2.0 * b[:, 0] * b[:, 1]
-            + b[:, 0] * a[:, 1]
-        )
-    ) / (24.0 * area)
-    u, v = centroid
-    return origin + centroid, np.array(
-        [square[0] - u * u, mixed - u * v, square[1] - v * v]
+    b = np.roll(a, -1, axis=-2)
+    (ax, ay), (bx, by) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
+    cross = ax * by - bx * ay
+    area = 0.5 * cross.sum(axis=-1)
+    u = (cross * (ax + bx)).sum(axis=-1) / (6.0 * area)
+    v = (cross * (ay + by)).sum(axis=-1) / (6.0 * area)
+    uu = (cross * (ax * ax + ax * bx + bx * bx)).sum(axis=-1)
+    vv = (cross * (ay * ay + ay * by + by * by)).sum(axis=-1)
+    uv_ = cross * (ax * by + 2.0 * ax * ay + 2.0 * bx * by + bx * ay)
+    moments = np.stack(
+        [
+            uu / (12.0 * area) - u * u,
+            uv_.sum(axis=-1) / (24.0 * area) - u * v,
+            vv / (12.0 * area) - v * v,
+        ],
+        axis=-1,
     )
+    return origin[..., 0, :] + np.stack([u, v], axis=-1), moments
 
 
 def expected_ellipse(
@@ -105,23 +103,30 @@ def expected_ellipse(
     xy: Array,
     blur: float,
 ) -> tuple[Array, Array]:
-    """The marker's image in the mirror: middle (2,) and moments (3,).
+    """The marker's images in the mirror: middles and moments.
 
     Args:
         knowledge: The robot's model of itself.
         plane: The mirror's plane (3,).
         reference: Its reference point (3,), m.
-        xy: Place of the drum (2,), m.
+        xy: Places of the drum (..., 2), m.
         blur: Standard deviation of the image's blur, px.
+
+    Returns:
+        Middles (..., 2), px, and moments (..., 3), px², of markers that are
+        before the camera; else NaN.
     """
-    top = np.array([*xy, knowledge.marker_height])
-    up = np.array([0.0, 0.0, 1.0])
-    outline = disc_outline(top, up, knowledge.marker_radius)
+    flat = disc_outline(
+        np.array([0.0, 0.0, knowledge.marker_height]),
+        np.array([0.0, 0.0, 1.0]),
+        knowledge.marker_radius,
+    )
+    xy = np.asarray(xy, dtype=float)
+    outline = np.broadcast_to(flat, (*xy.shape[:-1], *flat.shape)).copy()
+    outline[..., :2] += xy[..., None, :]
     image = reflect(plane, reference, outline)
     X_CW = invert_pose(knowledge.eye(knowledge.posture))
     uv = knowledge.camera.project(transform_points(X_CW, image))
-    if not np.all(np.isfinite(uv)):
-        return uv[0], np.ones(3)
     center, moments = polygon_moments(uv)
     return center, moments + blur**2 * np.array([1.0, 0.0, 1.0])
 
@@ -178,17 +183,15 @@ def estimate_from_ellipses(
 
     def residuals(x: Array) -> Array:
         robot = robot_of(x)
-        plane = moved(x[:3], reference, robot.eye_position)
-        places = _places(robot.optical_map(), plane, seen)
-        off = [
-            shape_features(
-                expected_ellipse(robot, x[:3], reference, xy, config.blur)[1]
-            )
-            for xy in places
-        ]
+        places = robot.places(x[:3], reference, seen)
+        _, moments = expected_ellipse(
+            robot, x[:3], reference, places, config.blur
+        )
+        # A marker behind the camera is no small ellipse.
+        expected = shape_features(np.nan_to_num(moments, nan=0.0))
         return np.concatenate(
             [
-                ((np.array(off) - shape) / config.moment_sd).ravel(),
+                ((expected - shape) / config.moment_sd).ravel(),
                 prior.residuals(x[:3]),
                 x[3:],
             ]
@@ -208,14 +211,8 @@ def estimate_from_ellipses(
     # Where the images scatter more than stated, less is known.
     excess = 2.0 * fit.cost / max(1, 3 * len(looks) - 3)
     robot = robot_of(fit.x)
-    plane = moved(fit.x[:3], reference, robot.eye_position)
     return EllipseEstimate(
         PlaneEstimate(fit.x[:3], covariance * max(1.0, excess), reference),
         robot,
-        _places(robot.optical_map(), plane, seen),
+        robot.places(fit.x[:3], reference, seen),
     )
-
-
-def _places(optical: OpticalMap, plane: Array, pixels: Array) -> Array:
-    """Places (m, 2) of markers seen at pixels (m, 2) in a plane (3,)."""
-    return optical.place(plane, optical.target_calibration.normalize(pixels))

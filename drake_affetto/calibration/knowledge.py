@@ -10,8 +10,9 @@ import dataclasses
 
 import numpy as np
 
+from drake_affetto.calibration.plane import normals, reflect
 from drake_affetto.common.fields import check_ranges, number
-from drake_affetto.common.typing import Array
+from drake_affetto.common.typing import Array, Mask
 from drake_affetto.geometry.kinematics import SerialChain
 from drake_affetto.geometry.optics import (
     PinholeCamera,
@@ -147,6 +148,32 @@ class RobotKnowledge:
         R, p = X_WC[..., :3, :3], X_WC[..., :3, 3]
         return self.camera.project(np.einsum("...ji,...j->...i", R, p_W - p))
 
+    def places(self, planes: Array, reference: Array, pixels: Array) -> Array:
+        """Where on the table drums are that are seen in mirrors (..., 2), m.
+
+        NaN where a mirror would show nothing of the table.
+
+        Args:
+            planes: The mirrors' planes (..., 3).
+            reference: Their reference point (3,), m.
+            pixels: Where the drums' markers are seen (..., 2), px; they
+                broadcast against the planes.
+        """
+        X_WC = self.eye(self.posture)
+        eye = X_WC[:3, 3]
+        ray = self.camera.direction(pixels) @ X_WC[:3, :3].T
+        n = normals(planes)
+        slope = np.sum(n * ray, axis=-1)
+        # Light that comes from the eye's image.
+        origin = reflect(planes, reference, eye)
+        direction = ray - 2.0 * slope[..., None] * n
+        with np.errstate(divide="ignore", invalid="ignore"):
+            way = (self.marker_height - origin[..., 2]) / direction[..., 2]
+            place = origin[..., :2] + way[..., None] * direction[..., :2]
+        # The eye looks towards the mirror.
+        shown = (slope < 0.0) & (way > 0.0)
+        return np.where(shown[..., None], place, np.nan)
+
     @property
     def eye_position(self) -> Array:
         """Where the camera is as it looks for the drum in the mirror, (3,)."""
@@ -189,9 +216,7 @@ def _extended(chain: SerialChain, X_TT: Array) -> SerialChain:
     return dataclasses.replace(chain, X_JT=chain.X_JT @ X_TT)
 
 
-def in_image(
-    knowledge: RobotKnowledge, readings: Array, margin: float
-) -> Array:
+def in_image(knowledge: RobotKnowledge, readings: Array, margin: float) -> Mask:
     """Whether the hand's marker shows directly at readings (m, n): (m,).
 
     Args:
