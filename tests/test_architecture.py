@@ -380,7 +380,6 @@ TESTS = ROOT / "tests"
 TESTED_IN = {
     "cli/drum": "cli/test_study_command.py",
     "cli/identify": "identification/test_study.py",
-    "cli/mirror": "cli/test_study_command.py",
     "cli/serve": "robot/test_server.py",
     "cli/tune": "tuning/test_study.py",
     "envs/scene_picture": "envs/test_drum.py",

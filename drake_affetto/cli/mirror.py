@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from drake_affetto.cli.options import add_renamed_flag, make_plan
 from drake_affetto.cli.study_command import Call, StudyCommand, rate_text
+from drake_affetto.common.errors import require
 from drake_affetto.experiments.plans import MirrorPlan, SelfCalibrationPlan
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ class MirrorCommand(StudyCommand[MirrorPlan]):
             action="store_true",
             help="run every changed view that comes with the package",
         )
-        which.add_argument(
+        parser.add_argument(
             "--self-calibrate",
             action="store_true",
             help="the robot finds mirrors by itself, without a demonstration",
@@ -64,9 +65,23 @@ class MirrorCommand(StudyCommand[MirrorPlan]):
         )
 
     def run(self, args: argparse.Namespace) -> int:
-        """Runs the study; 1 if the robot finds no mirror by itself."""
+        """Runs the study; 1 if the robot finds no mirror by itself.
+
+        Raises:
+            InputError: If an option or the file of settings does not fit.
+        """
+        from drake_affetto.calibration.config import load_self_calibration
         from drake_affetto.calibration.plane import CalibrationFailure
 
+        if args.self_calibrate:
+            require(
+                not args.all_scenarios,
+                "--self-calibrate",
+                True,
+                "one changed view, without --all-scenarios",
+            )
+            load_self_calibration(args.calibration)
+            _require_mirror(args.scenario or MirrorPlan.scenario)
         try:
             return super().run(args)
         except CalibrationFailure as failure:
@@ -109,6 +124,19 @@ class MirrorCommand(StudyCommand[MirrorPlan]):
             call.console.print("Recording a direct and a mirrored trial ...")
             _record(call.out, outcome, plan)
         return outcome.results
+
+
+def _require_mirror(scenario: str) -> None:
+    """Raises InputError unless a scenario looks into a mirror."""
+    from drake_affetto.station.scenario import load_scenario
+
+    loaded = load_scenario(scenario)
+    require(
+        loaded.look.mode == "fixed_yaw" and bool(loaded.mirrors),
+        "--scenario",
+        scenario,
+        "with --self-calibrate a view into a mirror from a fixed yaw",
+    )
 
 
 def _self_calibrate(call: Call[MirrorPlan]) -> "MirrorResults":

@@ -2,6 +2,7 @@
 
 import dataclasses
 import inspect
+from pathlib import Path
 import typing
 
 import numpy as np
@@ -28,7 +29,12 @@ from drake_affetto.scene.world import FramePose
 from support.fake_mirrors import FakeMirrors
 
 PLAN = SelfCalibrationPlan(
-    repeats=2, evaluations=3, demonstrations=8, skills=1, samples=(3,)
+    settings=str(Path(__file__).parent / "data/quick_self_calibration.yaml"),
+    repeats=2,
+    evaluations=3,
+    demonstrations=8,
+    skills=1,
+    samples=(3,),
 )
 ROOM = (belief, ellipse, hand, knowledge, plane, postures, watch)
 
