@@ -416,6 +416,7 @@ TESTED_IN = {
 MORE_TESTS = {
     "experiments/test_workspace_images.py": "experiments/workspace",
     "report/test_browser.py": "report/page",
+    "report/test_self_calibration.py": "report/page",
     "robot/test_robot_software.py": "robot/log",
     "scene/test_contact.py": "scene/world",
     "scene/test_models.py": "scene/world",
