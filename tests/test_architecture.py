@@ -22,6 +22,7 @@ ORDER = [
     {"geometry"},
     {"scene"},
     {"perception"},
+    {"calibration"},
     {"skill"},
     {"motion"},
     {"control"},
@@ -40,7 +41,7 @@ ORDER = [
     {"cli"},
 ]
 RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
-STAGES = [name for names in ORDER[1:11] for name in names]
+STAGES = [name for names in ORDER[1:12] for name in names]
 
 # The mathematics, which must also serve who has no Drake. The test adds to
 # them every module of a stage that does not import Drake in its own text.
@@ -379,7 +380,6 @@ TESTS = ROOT / "tests"
 TESTED_IN = {
     "cli/drum": "cli/test_study_command.py",
     "cli/identify": "identification/test_study.py",
-    "cli/mirror": "cli/test_study_command.py",
     "cli/serve": "robot/test_server.py",
     "cli/tune": "tuning/test_study.py",
     "envs/scene_picture": "envs/test_drum.py",
@@ -417,6 +417,7 @@ TESTED_IN = {
 MORE_TESTS = {
     "experiments/test_workspace_images.py": "experiments/workspace",
     "report/test_browser.py": "report/page",
+    "report/test_self_calibration.py": "report/page",
     "robot/test_robot_software.py": "robot/log",
     "scene/test_contact.py": "scene/world",
     "scene/test_models.py": "scene/world",

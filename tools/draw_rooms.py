@@ -26,7 +26,7 @@ _ALIASES = {"scenario": "station"}
 # Groups of rooms, in pale colors that print.
 _COLORS = {
     "#e6e6e6": ("common", "geometry"),
-    "#cfe3f7": ("scene", "perception"),
+    "#cfe3f7": ("scene", "perception", "calibration"),
     "#dcd3f2": ("skill", "motion"),
     "#fbeeb8": ("control", "pneumatics", "sensing"),
     "#d3efd0": ("sound", "teaching"),

@@ -3,11 +3,13 @@
 import argparse
 import dataclasses
 from pathlib import Path
+import sys
 from typing import TYPE_CHECKING, Any
 
 from drake_affetto.cli.options import add_renamed_flag, make_plan
 from drake_affetto.cli.study_command import Call, StudyCommand, rate_text
-from drake_affetto.experiments.plans import MirrorPlan
+from drake_affetto.common.errors import require
+from drake_affetto.experiments.plans import MirrorPlan, SelfCalibrationPlan
 
 if TYPE_CHECKING:
     from drake_affetto.experiments.mirror import MirrorOutcome
@@ -45,6 +47,17 @@ class MirrorCommand(StudyCommand[MirrorPlan]):
             action="store_true",
             help="run every changed view that comes with the package",
         )
+        parser.add_argument(
+            "--self-calibrate",
+            action="store_true",
+            help="the robot finds mirrors by itself, without a demonstration",
+        )
+        parser.add_argument(
+            "--calibration",
+            metavar="FILE",
+            default=SelfCalibrationPlan.settings,
+            help="YAML file of the self-calibration's settings",
+        )
         add_renamed_flag(
             parser,
             "--no-media",
@@ -61,14 +74,40 @@ class MirrorCommand(StudyCommand[MirrorPlan]):
             samples=tuple(sorted(args.samples)),
         )
 
+    def run(self, args: argparse.Namespace) -> int:
+        """Runs the study; 1 if the robot finds no mirror by itself.
+
+        Raises:
+            InputError: If an option or the file of settings does not fit.
+        """
+        from drake_affetto.calibration.config import load_self_calibration
+        from drake_affetto.calibration.plane import CalibrationFailure
+
+        if args.self_calibrate:
+            require(
+                not args.all_scenarios,
+                "--self-calibrate",
+                True,
+                "one changed view, without --all-scenarios",
+            )
+            load_self_calibration(args.calibration)
+            _require_mirror(args.scenario or MirrorPlan.scenario)
+        try:
+            return super().run(args)
+        except CalibrationFailure as failure:
+            print(f"affetto: no calibration: {failure}", file=sys.stderr)
+            return 1
+
     def scenarios(
         self, plan: MirrorPlan, args: argparse.Namespace
     ) -> tuple[str, ...]:
         """Direct view, in which the first trials teach the skill, and other."""
         return plan.direct, *_views(plan, args)
 
-    def study(self, call: Call[MirrorPlan]) -> Outcomes:
+    def study(self, call: Call[MirrorPlan]) -> Any:
         """Runs the study of each view; prints its results as they come."""
+        if call.args.self_calibrate:
+            return _self_calibrate(call)
         from drake_affetto.experiments.mirror import run_mirror
 
         plan = call.plan
@@ -82,9 +121,11 @@ class MirrorCommand(StudyCommand[MirrorPlan]):
             _print(found[name].results, call.console)
         return found
 
-    def finish(self, call: Call[MirrorPlan], found: Outcomes) -> Any:
+    def finish(self, call: Call[MirrorPlan], found: Any) -> Any:
         """Records a trial of each view; gathers the results."""
         plan = call.plan
+        if call.args.self_calibrate:
+            return found
         if call.args.all_scenarios:
             from drake_affetto.experiments.results import ScenariosResults
 
@@ -95,6 +136,66 @@ class MirrorCommand(StudyCommand[MirrorPlan]):
             call.console.print("Recording a direct and a mirrored trial ...")
             _record(call.out, outcome, plan)
         return outcome.results
+
+
+def _require_mirror(scenario: str) -> None:
+    """Raises InputError unless a scenario looks into a mirror."""
+    from drake_affetto.station.scenario import load_scenario
+
+    loaded = load_scenario(scenario)
+    require(
+        loaded.look.mode == "fixed_yaw" and bool(loaded.mirrors),
+        "--scenario",
+        scenario,
+        "with --self-calibrate a view into a mirror from a fixed yaw",
+    )
+
+
+def _self_calibrate(call: Call[MirrorPlan]) -> "MirrorResults":
+    """Has the robot find mirrors by itself; prints how well."""
+    from drake_affetto.experiments.self_calibration_study import (
+        run_self_calibration,
+    )
+
+    plan = call.plan
+    results = run_self_calibration(
+        call.executor,
+        SelfCalibrationPlan(
+            scenario=plan.scenario,
+            samples=plan.samples,
+            repeats=plan.repeats,
+            evaluations=plan.evaluations,
+            demonstrations=plan.demonstrations,
+            settings=call.args.calibration,
+            direct=plan.direct,
+            seed=plan.seed,
+        ),
+    )
+    _print(results, call.console)
+    _print_methods(results, call.console)
+    return results
+
+
+def _print_methods(results: "MirrorResults", console: Any) -> None:
+    from rich.table import Table
+
+    found = results.self_calibration
+    assert found is not None
+    table = Table(title="Without a demonstration, the same positions")
+    for column in ("method", "success", "looks", "strokes", "plane off by"):
+        table.add_column(column)
+    for name, method in found.methods.items():
+        off = "-"
+        if method.angle_error is not None and method.offset_error is not None:
+            off = f"{method.angle_error:.2f}°, {method.offset_error:.1f} mm"
+        table.add_row(
+            name,
+            rate_text(method.success_rate),
+            f"{method.looks:.1f}",
+            f"{method.strokes:.0f}",
+            off,
+        )
+    console.print(table)
 
 
 def _record(out: Path, outcome: "MirrorOutcome", plan: MirrorPlan) -> None:

@@ -130,12 +130,12 @@ class _Look:
     """The last search of a runner, and the station at its end.
 
     Attributes:
-        key: Position of the drum and seed of the trial.
+        key: Position of the drum, seed of the trial and pose of the mirror.
         outcome: Outcome of the search.
         end: Context at its end.
     """
 
-    key: tuple[float, float, int]
+    key: tuple[float, float, int, world.FramePose | None]
     outcome: GazeOutcome
     end: Context
 
@@ -207,8 +207,17 @@ class TrialRunner:
             self.station.plant, "affetto::right_palm"
         )
         self._settled: Context | None = None
+        self._mirror: world.FramePose | None = None
         self._looked: _Look | None = None
         self._taps: list[Array] | None = None
+
+    def place_mirror(self, pose: world.FramePose | None) -> None:
+        """Puts the mirror there in the trials to come; None: as the scenario.
+
+        Args:
+            pose: Pose of the frame `mirror_pose`.
+        """
+        self._mirror = pose
 
     def tap_prototypes(self) -> list[Array]:
         """Prototypes of the drum's sound when a person taps it."""
@@ -252,10 +261,8 @@ class TrialRunner:
         """
         begin = self.settle(xy, seed)
         # The gaze alone: no movement starts within any trial's time.
-        self.station.policy.set_policy_parameters(
-            self._sub(self.station.policy),
-            np.zeros(self.station.num_joints * self.dmp.n_basis),
-            begin + 1e6,
+        self.play(
+            np.zeros(self.station.num_joints * self.dmp.n_basis), begin + 1e6
         )
         self._enable_gaze()
         outcome = self._wait_for_gaze(begin, on_frame)
@@ -335,12 +342,15 @@ class TrialRunner:
             theta: Parameters θ of the movement (n·K,).
             seed: Seed of the microphone's noise and the robot's variation.
         """
-        begin = self.settle(xy, seed)
-        start = begin + self.scenario.policy.delay
+        start = self.settle(xy, seed) + self.scenario.policy.delay
+        self.play(theta, start)
+        return self._record(start, seed)
+
+    def play(self, theta: Array, start: float) -> None:
+        """Has the movement θ (n·K,) begin at the time `start`, s."""
         self.station.policy.set_policy_parameters(
             self._sub(self.station.policy), theta, start
         )
-        return self._record(start, seed)
 
     def drum(
         self, xy: Array, regressor: Regressor, seed: int
@@ -381,7 +391,7 @@ class TrialRunner:
             xy: Position of the drum (2,), m.
             seed: Seed of the trial.
         """
-        key = (float(xy[0]), float(xy[1]), seed)
+        key = (float(xy[0]), float(xy[1]), seed, self._mirror)
         if self._looked is None or self._looked.key != key:
             outcome = self.gaze(xy, seed)
             if self._looked is None:
@@ -449,6 +459,8 @@ class TrialRunner:
             self._settled = self.context.Clone()
         self._copy(self._settled, self.context)
         self.station.set_drum_position(self._station_context, xy)
+        if self._mirror is not None:
+            self.station.set_mirror_pose(self._station_context, self._mirror)
         self.station.set_seed(self._station_context, seed)
         self._clear_logs()
         self.simulator.Initialize()

@@ -149,6 +149,54 @@ class MirrorPlan(Plan):
 
 
 @dataclasses.dataclass(frozen=True)
+class SelfCalibrationPlan(Plan):
+    """How the robot finds mirrors by itself, and how often.
+
+    Attributes:
+        scenario: Scenario of the view with the mirror, by name or path.
+        samples: Numbers of demonstrations that the schemes beside are given.
+        repeats: Number of times that all of it is done, each with a mirror,
+            a robot that knows itself badly in its own way, and positions of
+            its own.
+        evaluations: Number of unseen positions of a repeat.
+        demonstrations: Number of demonstrations in direct view, from which
+            the skill is learned.
+        skills: Number of skills that are learned; repeats share them.
+        schemes: Schemes that are compared with demonstrations.
+        rotation: Greatest turn of the mirror about x and z, degrees.
+        translation: Greatest shift of the mirror along each axis, m.
+        least_seen: Share of the drum's region that a mirror must show; one
+            that does not is set up anew.
+        turned_by: Angle by which the mirror is turned in between, degrees.
+        turned_after: Number of strokes after which it is.
+        settings: YAML file of the self-calibration.
+        direct: Scenario in which the skill is learned.
+        seed: Seed of everything that is random.
+    """
+
+    scenario: str = "mirror"
+    samples: tuple[int, ...] = number((3, 4, 5), 2, 100)
+    repeats: int = number(10, 1, 1000)
+    evaluations: int = number(8, 1, 1000)
+    demonstrations: int = number(25, 3, 1000)
+    skills: int = number(2, 1, 1000)
+    schemes: tuple[str, ...] = ("relearn", "transfer_default")
+    rotation: float = number(5.0, 0.0, 30.0)
+    translation: float = number(0.03, 0.0, 0.3)
+    least_seen: float = number(0.95, 0.0, 1.0)
+    turned_by: float = number(5.0, -45.0, 45.0)
+    turned_after: int = number(10, 1, 1000)
+    settings: str = "package://drake_affetto/self_calibration.yaml"
+    direct: str = "drumming"
+    seed: int = number(0, 0, GREATEST_SEED)
+
+    @property
+    def pool_size(self) -> int:
+        """Number of demonstrations before each mirror."""
+        return max(self.samples)
+
+
+@dataclasses.dataclass(frozen=True)
 class DemoPlan(Plan):
     """How much the demo does.
 

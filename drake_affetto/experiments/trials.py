@@ -11,6 +11,9 @@ kinds are
     strike         the whole chain with what a skill says given: gaze,
                    movement, sound
     drumming       the whole chain: gaze, skill, movement, sound
+    hand_look      the arm goes to a posture, at which the hand's marker is
+                   looked for in the mirror
+    ellipse_look   the gaze, then the shape of the drum's marker
 
 and `drake_affetto.experiments.results` has the result of each.
 """
@@ -30,17 +33,25 @@ from drake_affetto.experiments.episode import (
     Recording,
     TrialRunner,
 )
+from drake_affetto.experiments.mirror_looks import (
+    look_at_ellipse,
+    look_at_hand,
+)
 from drake_affetto.experiments.results.trial import (
     DemonstrationResult,
     DrummingResult,
+    EllipseLookResult,
     GazeResult,
+    HandLookResult,
     StrikeResult,
     TrialResult,
     pack,
     unpack,
 )
 from drake_affetto.geometry.region import spread_inside
+from drake_affetto.perception.blob import BlobCalibration, BlobConfig
 from drake_affetto.runner.executor import Key, Result, Spec, TrialExecutor
+from drake_affetto.scene.world import FramePose
 from drake_affetto.skill.policy import Regressor
 from drake_affetto.sound.reward import reward_over_time
 from drake_affetto.station.content import (
@@ -171,6 +182,18 @@ def check_entry(
     return now
 
 
+def at_mirror(spec: Spec, pose: FramePose | None) -> Spec:
+    """The spec of the same trial with the mirror elsewhere.
+
+    Args:
+        spec: Spec of any kind.
+        pose: Pose of the frame `mirror_pose`; None for the scenario's.
+    """
+    if pose is None:
+        return spec
+    return {**spec, "mirror": dataclasses.asdict(pose)}
+
+
 def _spec(kind: str, scenario: str, **rest: Any) -> Spec:
     return {"kind": kind, "scenario": scenario_entry(scenario), **rest}
 
@@ -257,6 +280,37 @@ def drumming(
     )
 
 
+def hand_look(
+    scenario: str,
+    xy: Sequence[float],
+    seed: int,
+    posture: np.ndarray,
+    blob: BlobConfig,
+) -> Spec:
+    """The spec of a look at the robot's own hand in the mirror.
+
+    Args:
+        scenario: Scenario, by name or path.
+        xy: Position of the drum meanwhile (2,), m.
+        seed: Seed of the noise.
+        posture: Angles of the joints (n,) at which it looks, rad.
+        blob: How the hand's marker looks.
+    """
+    return _spec(
+        "hand_look",
+        scenario,
+        xy=list(xy),
+        seed=seed,
+        posture=np.asarray(posture, float).tolist(),
+        blob=dataclasses.asdict(blob),
+    )
+
+
+def ellipse_look(scenario: str, xy: Sequence[float], seed: int) -> Spec:
+    """The spec of a look at the shape of the drum's marker at xy."""
+    return _spec("ellipse_look", scenario, xy=list(xy), seed=seed)
+
+
 @dataclasses.dataclass(frozen=True)
 class Movement:
     """What a skill says where it has been asked already.
@@ -290,13 +344,18 @@ def run_trial(
         "drumming": _run_drumming,
         "look": _run_look,
         "strike": _run_strike,
+        "hand_look": _run_hand_look,
+        "ellipse_look": _run_ellipse_look,
     }
     kind = spec["kind"]
     if kind not in kinds:
         raise InputError(f"no kind of trial is called {kind!r}")
     entry = spec["scenario"]
     given = {scenario_source(k): v for k, v in (runners or {}).items()}
-    return kinds[kind](given.get(entry[NAME]) or runner_of(entry), spec)
+    trials = given.get(entry[NAME]) or runner_of(entry)
+    mirror = spec.get("mirror")
+    trials.place_mirror(None if mirror is None else FramePose(**mirror))
+    return kinds[kind](trials, spec)
 
 
 def run_task(
@@ -453,6 +512,22 @@ def _run_strike(trials: TrialRunner, spec: Spec) -> StrikeResult:
         graze=landing.graze,
         reward_over_time=trace.astype(np.float32),
     )
+
+
+def _run_hand_look(trials: TrialRunner, spec: Spec) -> HandLookResult:
+    blob = dict(spec["blob"])
+    blob["calibration"] = BlobCalibration(**blob["calibration"])
+    return look_at_hand(
+        trials,
+        np.array(spec["xy"]),
+        spec["seed"],
+        np.array(spec["posture"]),
+        BlobConfig(**blob),
+    )
+
+
+def _run_ellipse_look(trials: TrialRunner, spec: Spec) -> EllipseLookResult:
+    return look_at_ellipse(trials, np.array(spec["xy"]), spec["seed"])
 
 
 def _contact(recording: Recording) -> dict[str, float]:

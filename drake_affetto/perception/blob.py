@@ -196,12 +196,15 @@ class Blob:
         u, v: centroid [pixels].
         area: area [pixels²], partly covered pixels counted by their part.
         confidence: from 0 to 1: how well hue, shape and size fit.
+        moments: variances and covariance of its pixels' places along u, u and
+            v, and v [pixels²]; zeros where they were not measured.
     """
 
     u: float
     v: float
     area: float
     confidence: float
+    moments: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 # Rims of fewer pixels do not tell an ellipse from another [pixels²].
@@ -476,7 +479,20 @@ def _join_group(
     size = min(1.0, area / (2.0 * config.min_area))
     u, v = ellipse.center
     confidence = size * min(1.0, seen) * min(1.0, covered + 0.1)
-    return seen * covered, Blob(float(u), float(v), area, confidence)
+    whole = Blob(float(u), float(v), area, confidence, _filled(ellipse))
+    return seen * covered, whole
+
+
+def _filled(ellipse: Ellipse) -> tuple[float, float, float]:
+    """Variances and covariance of the pixels of a whole marker.
+
+    Args:
+        ellipse: Through the pixels of its rim, half a pixel within the edge.
+    """
+    a, b = ellipse.axes
+    inner = np.linalg.inv(ellipse.shape) / 4.0
+    inner *= (a + 0.5) * (b + 0.5) / (a * b)
+    return float(inner[0, 0]), float(inner[0, 1]), float(inner[1, 1])
 
 
 def _complete(
@@ -527,6 +543,7 @@ def _complete(
         float(ellipse.center[1]),
         area,
         blob.confidence * min(1.0, seen),
+        _filled(ellipse),
     )
 
 
@@ -568,7 +585,7 @@ def _judge(
         return None
     shape = min(1.0, max(0.0, 1.0 - 4.0 * abs(1.0 - fill)))
     size = min(1.0, area / (2.0 * config.min_area))
-    return Blob(u, v, area, 0.2 + 0.8 * shape * size)
+    return Blob(u, v, area, 0.2 + 0.8 * shape * size, (xx, xy, yy))
 
 
 def _simple_blobs(

@@ -1,6 +1,5 @@
 """The system that finds the marker in the camera's image."""
 
-import dataclasses
 from typing import Any
 
 import numpy as np
@@ -97,7 +96,7 @@ class BlobReporter(LeafSystem):
         cache.set_value(
             np.zeros(4)
             if blob is None or blob.confidence < self._config.min_confidence
-            else np.array(dataclasses.astuple(blob), dtype=float)
+            else np.array([blob.u, blob.v, blob.area, blob.confidence])
         )
 
     def _calc_blob(self, context: Context, output: BasicVector) -> None:

@@ -64,6 +64,7 @@ ACTIVE_JOINTS = (
 """The joints that drum, unless a scenario names others, in their order."""
 
 _PLACEMENT = "drum_placement"
+_MIRROR = "mirror_pose"
 
 
 @dataclasses.dataclass
@@ -519,6 +520,35 @@ def set_drum_position(
     )
     height = table_extents(plant, context)[1][2]
     frame.SetPoseInParentFrame(context, RigidTransform([*place, height]))
+
+
+def set_mirror_pose(
+    plant: MultibodyPlant, context: Context, pose: FramePose
+) -> None:
+    """Puts the mirror elsewhere than the directives have it.
+
+    Args:
+        plant: The finalized plant.
+        context: The plant's context.
+        pose: Pose of the frame `mirror_pose`; its z is the mirror's normal.
+
+    Raises:
+        InputError: For a pose that is out of range.
+    """
+    pose.check("mirror")
+    frame: Any = plant.GetFrameByName(_MIRROR)
+    rotation = RollPitchYaw(np.radians(pose.rotation))
+    frame.SetPoseInParentFrame(
+        context, RigidTransform(rotation, pose.translation)
+    )
+
+
+def get_mirror_pose(plant: MultibodyPlant, context: Context) -> FramePose:
+    """The pose of the frame `mirror_pose`."""
+    frame: Any = plant.GetFrameByName(_MIRROR)
+    X = frame.GetPoseInParentFrame(context)
+    rotation = RollPitchYaw(X.rotation()).vector()
+    return FramePose(X.translation().tolist(), np.degrees(rotation).tolist())
 
 
 def get_drum_position(plant: MultibodyPlant, context: Context) -> np.ndarray:

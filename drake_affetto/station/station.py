@@ -274,6 +274,14 @@ class AffettoStation(Diagram):
         """
         world.set_drum_position(self.plant, self._sub(self.plant, context), xy)
 
+    def set_mirror_pose(self, context: Context, pose: world.FramePose) -> None:
+        """Puts the mirror elsewhere; the pose is that of `mirror_pose`.
+
+        Raises:
+            InputError: for a pose that is out of range.
+        """
+        world.set_mirror_pose(self.plant, self._sub(self.plant, context), pose)
+
     def drum_position(self, context: Context) -> np.ndarray:
         """Where the drum stands, (2,) m in the world frame."""
         return world.get_drum_position(

@@ -48,7 +48,9 @@ from drake_affetto.experiments.results.toy import (
 from drake_affetto.experiments.results.trial import (
     DemonstrationResult,
     DrummingResult,
+    EllipseLookResult,
     GazeResult,
+    HandLookResult,
     StrikeResult,
 )
 
@@ -66,9 +68,11 @@ __all__ = [
     "DemonstrationResult",
     "DrumResults",
     "DrummingResult",
+    "EllipseLookResult",
     "EvaluatedPosition",
     "FinalTest",
     "GazeResult",
+    "HandLookResult",
     "LearningCurve",
     "MirrorResults",
     "RewardEvaluation",

@@ -15,6 +15,9 @@ from drake_affetto.experiments.results.rates import (
     Position,
     SuccessRate,
 )
+from drake_affetto.experiments.results.self_calibration import (
+    SelfCalibrationResults,
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,6 +132,8 @@ class MirrorResults(StudyResults):
         chance: Success of the best constant stroke, played blind.
         bodies: How each repeat's robot departs from its model, by name of the
             number; empty where all are alike.
+        self_calibration: How the robot finds the mirror by itself; None if it
+            was not tried.
     """
 
     KIND: ClassVar[str] = "mirror"
@@ -146,9 +151,12 @@ class MirrorResults(StudyResults):
     map: TransferMap | None = None
     chance: SuccessRate | None = None
     bodies: list[dict[str, float]] = field(default_factory=list)
+    self_calibration: SelfCalibrationResults | None = None
 
     def check(self, where: str) -> None:
         """Raises InputError where parts do not fit each other."""
+        if self.self_calibration is not None:
+            self.self_calibration.check(f"{where}self_calibration")
         for name, cells in self.schemes.items():
             for samples in self.samples:
                 if samples not in cells:

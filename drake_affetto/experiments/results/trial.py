@@ -118,11 +118,62 @@ class DrummingResult:
     impulse: float = field(metadata=NOT_NEGATIVE)
 
 
-TrialResult = GazeResult | DemonstrationResult | StrikeResult | DrummingResult
+@dataclasses.dataclass(frozen=True)
+class HandLookResult:
+    """A look at the robot's own hand in the mirror.
+
+    Attributes:
+        readings: Angles of the joints by the robot's sensors, rad.
+        pixel: Where the hand's marker is seen, px; None if it is not.
+        area: Its area, px².
+    """
+
+    KIND: ClassVar[str] = "hand_look"
+    ARRAYS: ClassVar[tuple[str, ...]] = ()
+
+    readings: list[float]
+    pixel: list[float] | None
+    area: float
+
+
+@dataclasses.dataclass(frozen=True)
+class EllipseLookResult:
+    """A search for the drum, and the shape in which its marker then shows.
+
+    Attributes:
+        found: Whether the gaze settled on the marker.
+        tau: Task parameter τ (2,).
+        moments: Variances and covariance of the marker's pixels' places along
+            u, u and v, and v, px²; None if it was not found.
+    """
+
+    KIND: ClassVar[str] = "ellipse_look"
+    ARRAYS: ClassVar[tuple[str, ...]] = ()
+
+    found: bool
+    tau: list[float]
+    moments: list[float] | None
+
+
+TrialResult = (
+    GazeResult
+    | DemonstrationResult
+    | StrikeResult
+    | DrummingResult
+    | HandLookResult
+    | EllipseLookResult
+)
 
 TRIAL_RESULTS: dict[str, Any] = {
     kind.KIND: kind
-    for kind in (GazeResult, DemonstrationResult, StrikeResult, DrummingResult)
+    for kind in (
+        GazeResult,
+        DemonstrationResult,
+        StrikeResult,
+        DrummingResult,
+        HandLookResult,
+        EllipseLookResult,
+    )
 }
 
 

@@ -1,0 +1,39 @@
+"""Noticing that a belief that was right has become wrong."""
+
+import math
+
+from drake_affetto.calibration.config import WatchConfig
+
+
+class StrokeWatch:
+    """Strokes that should be heard and are not, counted up (Page 1954).
+
+    Each stroke adds the log of how much likelier its outcome is if the mirror
+    has moved; the sum never falls below zero. Once it reaches the threshold,
+    the belief is taken to be wrong.
+    """
+
+    def __init__(self, config: WatchConfig) -> None:
+        self._config = config
+        self.sum = 0.0
+
+    def add(self, chance: float, heard: bool) -> bool:
+        """Takes in a stroke; whether the belief is taken to be wrong now.
+
+        Args:
+            chance: Probability that the stroke is heard, as believed.
+            heard: Whether it was.
+        """
+        right = min(chance, self._config.hit_when_right)
+        # A stroke of which little was expected does not speak against it.
+        wrong = min(self._config.hit_when_wrong, right)
+        if heard:
+            step = math.log(wrong / right)
+        else:
+            step = math.log((1.0 - wrong) / (1.0 - right))
+        self.sum = max(0.0, self.sum + step)
+        return self.sum >= self._config.threshold
+
+    def reset(self) -> None:
+        """Begins anew, after a calibration."""
+        self.sum = 0.0

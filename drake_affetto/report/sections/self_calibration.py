@@ -1,0 +1,103 @@
+"""No demonstration at all: the robot finds the mirror by itself."""
+
+from drake_affetto.experiments.results.self_calibration import (
+    MethodResult,
+    SelfCalibrationResults,
+)
+from drake_affetto.report import wording
+from drake_affetto.report.charts.self_calibration import (
+    METHODS,
+    demonstrations_needed,
+    shrinking_belief,
+)
+from drake_affetto.report.parts import Section, Table, make_table
+from drake_affetto.report.report_data import ReportData
+
+
+def make(data: ReportData) -> Section | None:
+    """The section; None if the robot was not asked to."""
+    results = data.results("mirror")
+    found = None if results is None else results.self_calibration
+    if found is None:
+        return None
+    charts = [
+        chart
+        for chart in (
+            demonstrations_needed(results, found),
+            shrinking_belief(found),
+        )
+        if chart is not None
+    ]
+    return Section(
+        "self_calibration",
+        "By itself",
+        "No demonstration at all",
+        {
+            "rotation": f"{found.rotation:g}",
+            "translation": f"{100 * found.translation:g}",
+            "table": _table(found),
+            "strokes": _strokes(found),
+            "watch": _watch(found),
+            "charts": charts,
+        },
+        tuple(charts),
+    )
+
+
+def _table(found: SelfCalibrationResults) -> Table:
+    return make_table(
+        ("by", "success", "looks", "own strokes", "plane off by", "covered"),
+        [
+            [
+                METHODS.get(name, name),
+                wording.rate(method.success_rate),
+                f"{method.looks:.1f}",
+                f"{method.strokes:.0f}",
+                _off(method),
+                "–"
+                if method.coverage is None
+                else wording.percent(method.coverage.mean),
+            ]
+            for name, method in found.methods.items()
+        ],
+        "What it took to find the mirror, and how exactly it is then known; "
+        "covered: share of mirrors within the stated region of 95 %",
+        show_caption=True,
+    )
+
+
+def _off(method: MethodResult) -> str:
+    if method.angle_error is None or method.offset_error is None:
+        return "–"
+    return f"{method.angle_error:.1f}°, {method.offset_error:.0f} mm"
+
+
+def _strokes(found: SelfCalibrationResults) -> str:
+    begins = {
+        "ellipse": "From what the ellipse tells",
+        "prior": "From “somewhere on my left”",
+    }
+    return " ".join(
+        f"{begins.get(each.start, each.start)}, strokes {each.late_from} to "
+        f"{each.late_to} by ear were heard in {wording.rate(each.late)}; "
+        f"without listening {wording.rate(each.chance)}."
+        for each in found.by_ear
+    )
+
+
+def _watch(found: SelfCalibrationResults) -> str:
+    watch = found.watch
+    if watch is None:
+        return ""
+    text = (
+        f"When the mirror was turned by {watch.turned_by:g}°, it noticed "
+        f"within six strokes in {wording.rate(watch.noticed)} of the repeats, "
+        f"with {wording.number(watch.false_alarms, 'false alarm')} in "
+        f"{watch.quiet_strokes} strokes before."
+    )
+    if watch.recovered is not None:
+        text += (
+            " After looking at its hand again it hit in "
+            f"{wording.rate(watch.recovered)}."
+        )
+    return text
