@@ -392,6 +392,7 @@ TESTED_IN = {
     "motion/spring": "motion/test_dmp.py",
     "motion/stepping": "motion/test_dmp.py",
     "perception/config": "perception/test_mirror_camera.py",
+    "perception/hue_gate": "perception/test_blob.py",
     "report/charts": "report/test_page.py",
     "report/parts": "report/test_page.py",
     "report/report_data": "report/test_page.py",

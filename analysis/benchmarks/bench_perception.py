@@ -33,8 +33,9 @@ from drake_affetto.experiments.view_maps import (
 )
 from drake_affetto.perception.blob import detect
 from drake_affetto.perception.imaging import ImageEffects
-from drake_affetto.perception.mirror_camera import DIRECT, find_frame
+from drake_affetto.perception.mirror_camera import DIRECT
 from drake_affetto.scene import world
+from drake_affetto.scene.parts import find_frame
 from drake_affetto.station.scenario import Scenario, load_scenario
 from drake_affetto.station.station import AffettoStation
 

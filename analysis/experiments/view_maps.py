@@ -24,7 +24,6 @@ from drake_affetto.common.output import (
 from drake_affetto.experiments.view_maps import (
     CHANGED_VIEWS,
     REFERENCE,
-    CalibrationError,
     TrueMap,
     ViewDomain,
     fit_affine,
@@ -37,6 +36,8 @@ from drake_affetto.experiments.view_maps import (
     measurement_noise,
     with_wrong_camera,
 )
+from drake_affetto.perception.knowledge import CalibrationError
+from drake_affetto.station.scenario import load_scenario
 
 FITS = (fit_affine, fit_projective, fit_quadratic)
 SAMPLES = [2, 3, 4, 5, 6, 8, 12, 20]
@@ -45,7 +46,9 @@ ERRORS = {
     "focal length 1 %": CalibrationError(focal=0.01),
     "orientation 1°": CalibrationError(angle=np.deg2rad(1.0)),
     "place 5 mm": CalibrationError(position=0.005),
-    "all three": CalibrationError(0.01, np.deg2rad(1.0), 0.005),
+    "height 3 mm": CalibrationError(height=0.003),
+    "neck 0.2°": CalibrationError(neck=np.deg2rad(0.2)),
+    "all of them": load_scenario("mirror").transfer.errors,
 }
 
 
@@ -141,9 +144,7 @@ def learn(true: TrueMap, reference: ViewDomain, repeats: int) -> list:
                 lambda X, Y, rng, error=error: fit_optical(
                     X,
                     Y,
-                    with_wrong_camera(
-                        optical, true.view, reference, error, rng
-                    ),
+                    with_wrong_camera(optical, error, rng),
                     noise[1],
                 ),
                 f"optical, {name}",

@@ -122,7 +122,7 @@ class ConditionsCommand(StudyCommand[MirrorPlan]):
             pool=max(6, *args.samples) + 2,
         )
 
-    def scenarios(self, plan):
+    def scenarios(self, plan, args):
         """Direct view, in which the first trials teach the skill, and other."""
         return plan.direct, plan.scenario
 

@@ -24,7 +24,8 @@ from drake_affetto.experiments.workspace import (
 )
 from drake_affetto.geometry.optics import polygon_area
 from drake_affetto.scene import world
-from drake_affetto.station.scenario import DrumRegion, Scenario, load_scenario
+from drake_affetto.station.drum_region import DrumRegion
+from drake_affetto.station.scenario import Scenario, load_scenario
 
 _REGIONS = (
     ("reach", "the hand strikes it from above", "#1f77b4"),

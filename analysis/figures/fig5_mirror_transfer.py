@@ -22,7 +22,9 @@ NAMES = {
     "continue": "continue",
     "transfer": "transfer\n(paper)",
     "transfer_default": "transfer\n(default)",
+    "transfer_affine": "transfer\n(affine)",
     "gaussian_process": "Gaussian\nprocess",
+    "affine_regression": "linear\nregression",
 }
 
 

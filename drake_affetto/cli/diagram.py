@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from drake_affetto.cli.options import add_scenario_argument
+from drake_affetto.cli.options import add_scenario_argument, whole_number
 from drake_affetto.common.errors import require
 from drake_affetto.common.owner import claim_file
 from drake_affetto.station.diagram_drawing import check_suffix, write_diagram
@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--depth",
         metavar="N",
-        type=int,
+        type=whole_number,
         default=1,
         help="how deep nested Diagrams are opened",
     )

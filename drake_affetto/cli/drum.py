@@ -1,5 +1,6 @@
 """`affetto drum`: learning to drum from demonstrations (paper Figs. 3b, 3c)."""
 
+import argparse
 from typing import TYPE_CHECKING, Any
 
 from drake_affetto.cli.study_command import Call, StudyCommand, rate_text
@@ -16,7 +17,9 @@ class DrumCommand(StudyCommand[DrumPlan]):
     plan = DrumPlan
     out = "out/drum"
 
-    def scenarios(self, plan: DrumPlan) -> tuple[str, ...]:
+    def scenarios(
+        self, plan: DrumPlan, args: argparse.Namespace
+    ) -> tuple[str, ...]:
         """That of the plan."""
         return (plan.scenario,)
 
@@ -24,7 +27,7 @@ class DrumCommand(StudyCommand[DrumPlan]):
         """Runs the study."""
         from drake_affetto.experiments.drumming import run_drum
 
-        return run_drum(call.executor, call.plan)
+        return run_drum(call.executor, call.plan, call.out)
 
     def show(self, results: "DrumResults", console: Any) -> None:
         """Prints success over demonstrations, and how good the reward is."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from drake_affetto.cli.options import add_output_argument
+from drake_affetto.cli.options import add_output_argument, whole_number
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.owner import claim_folder
 
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--joint",
-        type=int,
+        type=whole_number,
         default=5,
         metavar="N",
         help="number of the joint in the logs; 5 is the left elbow",

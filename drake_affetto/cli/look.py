@@ -7,6 +7,7 @@ from drake_affetto.cli.options import (
     add_output_argument,
     add_scenario_argument,
     add_seed_argument,
+    real_number,
 )
 from drake_affetto.common.errors import require_range
 from drake_affetto.common.owner import claim_folder
@@ -26,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--drum",
         metavar=("X", "Y"),
         nargs=2,
-        type=float,
+        type=real_number,
         help="position of the drum, m; the middle of its region by default",
     )
     add_output_argument(parser, "out/look")
@@ -76,6 +77,7 @@ def run(args: argparse.Namespace) -> int:
     )
     sight = make_gaze_geometry(station, context)
     yaw = sight.looking_yaw(xy)
+    # Nothing is written for a drum that cannot be looked at.
     out = claim_folder(args.out, "look")
     for name, angle in (("start", None), ("look", yaw)):
         if angle is not None:

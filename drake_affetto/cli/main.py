@@ -18,6 +18,7 @@ import contextlib
 import errno
 import importlib
 import os
+import re
 import signal
 import sys
 import threading
@@ -57,7 +58,15 @@ _FULL = (errno.EBADF, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.ENOSPC)
 
 
 class _Parser(argparse.ArgumentParser):
-    """argparse, but an error is one line, and help that fails is one."""
+    """argparse, but an error is one line, and -9e-2 is a number.
+
+    Help that cannot be written is an error too.
+    """
+
+    def __init__(self, *args: Any, **kwargs: Any):
+        super().__init__(*args, **kwargs)
+        # argparse takes words like these for options otherwise.
+        self._negative_number_matcher = _NEGATIVE_NUMBER
 
     def _print_message(self, message: str, file: Any = None) -> None:
         # argparse's own hides that nothing was written.
@@ -70,6 +79,12 @@ class _Parser(argparse.ArgumentParser):
             file=sys.stderr,
         )
         raise SystemExit(2)
+
+
+_NEGATIVE_NUMBER = re.compile(
+    r"-(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|inf(?:inity)?|nan)$",
+    re.IGNORECASE,
+)
 
 
 def _chosen(argv: Sequence[str]) -> str | None:

@@ -16,6 +16,15 @@ if TYPE_CHECKING:
 Outcomes = dict[str, "MirrorOutcome"]
 
 
+def _views(plan: MirrorPlan, args: argparse.Namespace) -> list[str]:
+    """The changed views that are asked for."""
+    if not args.all_scenarios:
+        return [plan.scenario]
+    from drake_affetto.experiments.mirror import changed_views
+
+    return changed_views()
+
+
 class MirrorCommand(StudyCommand[MirrorPlan]):
     """Compares schemes of transfer, in one changed view or in all."""
 
@@ -52,21 +61,23 @@ class MirrorCommand(StudyCommand[MirrorPlan]):
             samples=tuple(sorted(args.samples)),
         )
 
-    def scenarios(self, plan: MirrorPlan) -> tuple[str, ...]:
+    def scenarios(
+        self, plan: MirrorPlan, args: argparse.Namespace
+    ) -> tuple[str, ...]:
         """Direct view, in which the first trials teach the skill, and other."""
-        return plan.direct, plan.scenario
+        return plan.direct, *_views(plan, args)
 
     def study(self, call: Call[MirrorPlan]) -> Outcomes:
         """Runs the study of each view; prints its results as they come."""
-        from drake_affetto.experiments.mirror import changed_views, run_mirror
+        from drake_affetto.experiments.mirror import run_mirror
 
         plan = call.plan
         found = {}
-        for name in (
-            changed_views() if call.args.all_scenarios else [plan.scenario]
-        ):
+        for name in _views(plan, call.args):
             found[name] = run_mirror(
-                call.executor, dataclasses.replace(plan, scenario=name)
+                call.executor,
+                dataclasses.replace(plan, scenario=name),
+                call.out,
             )
             _print(found[name].results, call.console)
         return found
@@ -92,7 +103,7 @@ def _record(out: Path, outcome: "MirrorOutcome", plan: MirrorPlan) -> None:
     from drake_affetto.station.scenario import load_scenario
 
     xy = outcome.positions[0]
-    direct, changed = map(load_scenario, (plan.direct, plan.scenario))
+    direct, changed = map(load_scenario, outcome.scenarios)
     scheme = outcome.schemes["transfer_default"]
     write_media(
         out,

@@ -3,16 +3,51 @@
 import argparse
 import dataclasses
 from pathlib import Path
+import types
 import typing
 from typing import Any, TypeVar
 
-from drake_affetto.common.errors import InputError, require_range
+from drake_affetto.common.errors import InputError, require_range, shown
 from drake_affetto.common.fields import option_name
 from drake_affetto.common.output import STORE
 
 WORKERS = 2
 
 Plan = TypeVar("Plan")
+T = TypeVar("T", int, float)
+
+
+def whole_number(text: str) -> int:
+    """An option's whole number, in decimal digits.
+
+    Raises:
+        argparse.ArgumentTypeError: For another text.
+    """
+    return _number(text, int, "a whole number")
+
+
+def real_number(text: str) -> float:
+    """An option's number, in decimal notation.
+
+    Raises:
+        argparse.ArgumentTypeError: For another text.
+    """
+    return _number(text, float, "a number")
+
+
+def _number(text: str, kind: type[T], expected: str) -> T:
+    # Python reads 1_0 as 10, and digits of any script.
+    try:
+        if "_" in text or not text.isascii():
+            raise ValueError
+        return kind(text)  # type: ignore[call-arg]
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{shown(text)} is not {expected}"
+        ) from None
+
+
+_NUMBERS: dict[type, Any] = {int: whole_number, float: real_number}
 
 
 def add_plan_arguments(parser: argparse.ArgumentParser, plan: type) -> None:
@@ -33,9 +68,9 @@ def add_plan_arguments(parser: argparse.ArgumentParser, plan: type) -> None:
         if kind is bool:
             how = {"action": "store_true"}
         elif typing.get_origin(kind) is tuple:
-            how |= {"type": typing.get_args(kind)[0], "nargs": "+"}
+            how |= {"type": _reader(typing.get_args(kind)[0]), "nargs": "+"}
         else:
-            how |= {"type": kind}
+            how |= {"type": _reader(kind)}
         default = field.default
         if isinstance(default, tuple):
             # An empty one has nothing to show in the help.
@@ -54,6 +89,13 @@ def add_plan_arguments(parser: argparse.ArgumentParser, plan: type) -> None:
                 default=argparse.SUPPRESS,
                 **how,
             )
+
+
+def _reader(kind: Any) -> Any:
+    """What reads an option of that kind; None is of no kind."""
+    if typing.get_origin(kind) in (typing.Union, types.UnionType):
+        (kind,) = (k for k in typing.get_args(kind) if k is not type(None))
+    return _NUMBERS.get(kind, kind)
 
 
 def make_plan(plan: type[Plan], args: argparse.Namespace, **more: Any) -> Plan:
@@ -88,7 +130,9 @@ def add_seed_argument(
     text: str = "seed of everything that is random",
 ) -> None:
     """Declares --seed."""
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help=text)
+    parser.add_argument(
+        "--seed", type=whole_number, default=0, metavar="N", help=text
+    )
 
 
 def add_renamed_flag(
@@ -116,7 +160,7 @@ def add_workers_argument(parser: Any) -> None:
     """Declares --workers."""
     parser.add_argument(
         "--workers",
-        type=int,
+        type=whole_number,
         # Not the number itself: argparse would not see it beside --dask.
         default=None,
         metavar="N",

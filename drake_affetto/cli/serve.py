@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 from drake_affetto.cli.options import (
     add_scenario_argument,
     add_seed_argument,
+    real_number,
+    whole_number,
 )
 from drake_affetto.common.errors import require_range
 from drake_affetto.common.owner import claim_file
@@ -28,13 +30,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_scenario_argument(parser)
     parser.set_defaults(scenario="robot")
     numbers = (
-        ("--sensor-port", int, 50000, "PORT", "where sensor packets go"),
-        ("--command-port", int, 50010, "PORT", "where commands are taken"),
-        ("--rate", float, 100.0, "HZ", "sensor packets a second"),
-        ("--seconds", float, None, "S", "stop by itself after this time"),
+        (
+            "--sensor-port",
+            whole_number,
+            50000,
+            "PORT",
+            "where sensor packets go",
+        ),
+        (
+            "--command-port",
+            whole_number,
+            50010,
+            "PORT",
+            "where commands are taken",
+        ),
+        ("--rate", real_number, 100.0, "HZ", "sensor packets a second"),
+        ("--seconds", real_number, None, "S", "stop by itself after this time"),
         (
             "--command-timeout",
-            float,
+            real_number,
             None,
             "S",
             "time without commands after which the last one holds, or all "

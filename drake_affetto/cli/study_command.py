@@ -122,7 +122,7 @@ class StudyCommand(Generic[P]):
         The workers start first, for that takes longest. The folder is made
         only if the scenarios fit.
         """
-        scenarios = self.scenarios(plan)
+        scenarios = self.scenarios(plan, args)
         with worker_pool(args, *scenarios[:1]) as pool:
             with console.status(f"Starting {pool.workers} workers"):
                 run = self.runs_trials()
@@ -137,7 +137,7 @@ class StudyCommand(Generic[P]):
             ) as executor:
                 yield Call(plan, args, console, out, executor)
 
-    def scenarios(self, plan: P) -> tuple[str, ...]:
+    def scenarios(self, plan: P, args: argparse.Namespace) -> tuple[str, ...]:
         """Scenarios by name or path, that of the first trials first."""
         raise NotImplementedError
 

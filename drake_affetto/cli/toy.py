@@ -1,5 +1,6 @@
 """`affetto toy`: the paper's toy experiment of transfer (Fig. 2)."""
 
+import argparse
 from typing import TYPE_CHECKING, Any
 
 from drake_affetto.cli.study_command import Call, StudyCommand
@@ -17,7 +18,9 @@ class ToyCommand(StudyCommand[ToyPlan]):
     out = "out/toy"
     trials = "seeds"
 
-    def scenarios(self, plan: ToyPlan) -> tuple[str, ...]:
+    def scenarios(
+        self, plan: ToyPlan, args: argparse.Namespace
+    ) -> tuple[str, ...]:
         """None."""
         return ()
 

@@ -8,6 +8,7 @@ from drake_affetto.cli.options import (
     add_restart_argument,
     add_seed_argument,
     add_workers_argument,
+    whole_number,
     worker_count,
 )
 from drake_affetto.cli.study_command import tells_how_to_continue
@@ -34,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--trials",
-        type=int,
+        type=whole_number,
         default=216,
         metavar="N",
         help="number of trials, those of earlier runs included",

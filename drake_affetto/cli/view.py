@@ -2,7 +2,7 @@
 
 import argparse
 
-from drake_affetto.cli.options import add_scenario_argument
+from drake_affetto.cli.options import add_scenario_argument, real_number
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -15,7 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--time-limit",
-        type=float,
+        type=real_number,
         default=None,
         metavar="SECONDS",
         help="stop by itself after this time",

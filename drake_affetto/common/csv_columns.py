@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_affetto.common.errors import InputError
+from drake_affetto.common.errors import InputError, shown
 
 
 def read_columns(
@@ -25,12 +25,12 @@ def read_columns(
         not a number, if the file says so.
 
     Raises:
-        InputError: for a file that cannot be read, a missing column, a cell
-            that is no number, or fewer than two rows.
+        InputError: for a file that cannot be read, a column that is missing
+            or there twice, a cell that is no number, or fewer than two rows.
     """
     rows = []
     try:
-        with path.open(encoding="utf-8", newline="") as file:
+        with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file)
             header = [name.strip() for name in next(reader, [])]
             missing = [name for name in needed if name not in header]
@@ -39,18 +39,24 @@ def read_columns(
                     f"{path}: no column {', '.join(missing)}; it has "
                     f"{len(header)} columns"
                 )
+            twice = [n for n in (*needed, *optional) if header.count(n) > 1]
+            if twice:
+                raise InputError(f"{path}: two columns {', '.join(twice)}")
             names = [*needed, *(name for name in optional if name in header)]
             places = [header.index(name) for name in names]
             for row in reader:
                 if not row:
                     continue
-                try:
-                    rows.append([float(row[place]) for place in places])
-                except (ValueError, IndexError):
-                    raise InputError(
-                        f"{path}: line {reader.line_num} has no number in "
-                        f"each of the columns {', '.join(names)}"
-                    ) from None
+                rows.append(
+                    [
+                        _number(
+                            row,
+                            place,
+                            f"{path}: line {reader.line_num}, column {name}",
+                        )
+                        for name, place in zip(names, places, strict=True)
+                    ]
+                )
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}") from error
     except UnicodeDecodeError as error:
@@ -60,3 +66,22 @@ def read_columns(
     if len(rows) < 2:
         raise InputError(f"{path}: fewer than two rows")
     return dict(zip(names, np.array(rows).T, strict=True))
+
+
+def _number(row: Sequence[str], place: int, where: str) -> float:
+    """The number in a cell; Python's 1_0, and digits of any script, are none.
+
+    Raises:
+        InputError: If the cell is missing or holds something else.
+    """
+    if place >= len(row):
+        raise InputError(f"{where} is missing: there are {len(row)} cells")
+    cell = row[place]
+    try:
+        if "_" in cell or not cell.isascii():
+            raise ValueError
+        return float(cell)
+    except ValueError:
+        raise InputError(
+            f"{where} is {shown(cell)}, expected a number"
+        ) from None

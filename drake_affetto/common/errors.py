@@ -1,6 +1,7 @@
 """Errors that a user can mend, each told in one line."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+import contextlib
 import math
 from pathlib import Path
 import reprlib
@@ -17,10 +18,23 @@ class InputError(ValueError):
     """
 
 
+# Longer values are cut in the middle: a message is one line.
+_LONGEST_VALUE = 160
+
+
+def shown(value: Any) -> str:
+    """`value` as a message shows it: its repr, cut if it is long."""
+    text = repr(value)
+    if len(text) > _LONGEST_VALUE:
+        half = _LONGEST_VALUE // 2
+        text = f"{text[:half]}...{text[-half:]}"
+    return text
+
+
 def require(condition: bool, field: str, value: Any, expected: str) -> None:
     """Raises InputError naming `field`, `value` and what was `expected`."""
     if not condition:
-        raise InputError(f"{field} is {value!r}, expected {expected}")
+        raise InputError(f"{field} is {shown(value)}, expected {expected}")
 
 
 def one_line(message: object) -> str:
@@ -43,6 +57,15 @@ def short(value: Any) -> Any:
     return _Short(value)
 
 
+@contextlib.contextmanager
+def naming(where: str) -> Iterator[None]:
+    """Names the whole, a file or a field, in errors about a part of it."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
+
+
 def require_range(
     field: str,
     value: float,
@@ -58,8 +81,10 @@ def require_range(
         expected = f"a number of at least {low:g}"
     else:
         expected = f"a number from {low:g} to {high:g}"
-    fits = isinstance(value, (int, float)) and low <= value <= high
-    require(fits and math.isfinite(value), field, value, expected)
+    # A truth value is no number, though Python's are.
+    fits = isinstance(value, (int, float)) and not isinstance(value, bool)
+    fits = fits and low <= value <= high
+    require(fits and abs(value) < math.inf, field, value, expected)
 
 
 def require_choice(field: str, value: Any, *choices: Any) -> None:
@@ -69,12 +94,13 @@ def require_choice(field: str, value: Any, *choices: Any) -> None:
 
 def require_interval(field: str, value: Sequence[float]) -> None:
     """Raises InputError unless `value` is a lower and a greater upper limit."""
+    expected = "a lower and a greater upper limit"
     require(
-        len(value) == 2 and value[0] < value[1],
-        field,
-        value,
-        "a lower and a greater upper limit",
+        isinstance(value, Sequence) and len(value) == 2, field, value, expected
     )
+    for i, limit in enumerate(value):
+        require_range(f"{field}[{i}]", limit)
+    require(value[0] < value[1], field, value, expected)
 
 
 def require_array(

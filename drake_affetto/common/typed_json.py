@@ -170,6 +170,8 @@ def _read_scalar(
     fits = isinstance(value, accepted) and (
         kind is bool or not isinstance(value, bool)
     )
+    if isinstance(value, int) and value.bit_length() > 1000:
+        fits = False  # No float holds it.
     expected = _NAMES[kind]
     bounds = limits.get("range") if kind in (int, float) else None
     if bounds is not None:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import copy
 import dataclasses
 import difflib
+import math
 from pathlib import Path
 import types
 import typing
@@ -16,8 +17,9 @@ from typing import Any, Protocol, TypeVar
 from pydrake.common.yaml import yaml_load_typed
 import yaml
 
-from drake_affetto.common.errors import InputError
+from drake_affetto.common.errors import InputError, shown
 from drake_affetto.common.resources import anchor, resolve
+from drake_affetto.common.strict_yaml import parse_yaml, read_text
 
 
 class _Checked(Protocol):
@@ -34,22 +36,14 @@ def read_yaml(path: Path) -> dict[str, Any]:
     """The mapping that the file `path` holds.
 
     Raises:
-        InputError: if the file cannot be read, is not YAML, or holds anything
-            but a mapping.
+        InputError: if the file cannot be read, is not YAML (see
+            `strict_yaml`), or holds anything but a mapping.
     """
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not UTF-8 text") from error
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f" in line {mark.line + 1}" if mark is not None else ""
-        problem = getattr(error, "problem", None) or "it cannot be parsed"
-        raise InputError(f"{path} is not YAML: {problem}{where}") from error
+    data = parse_yaml(read_text(path), str(path))
     if data is None:
-        data = {}
+        raise InputError(
+            f"{path} is empty, expected a mapping of fields to values"
+        )
     if not isinstance(data, dict):
         raise InputError(f"{path} holds no mapping at its top")
     return data
@@ -198,6 +192,19 @@ def _refuse_unknown(data: Any, schema: Any, where: str) -> None:
 _SCALARS = {int: "a whole number", float: "a number", str: "text"}
 
 
+def _is_scalar(schema: type, data: Any) -> bool:
+    """Whether `data` is a number or a text, as `schema` says."""
+    if isinstance(data, bool) or not isinstance(data, (int, float, str)):
+        return False
+    if schema is str or isinstance(data, str):
+        return schema is str and isinstance(data, str)
+    try:
+        number = float(data)
+    except OverflowError:
+        return False
+    return math.isfinite(number) and (schema is float or number.is_integer())
+
+
 def _first_misfit(data: Any, schema: Any, where: str) -> str | None:
     """Says which value of `data` does not have the type of `schema`."""
     if typing.get_origin(schema) in (typing.Union, types.UnionType) and (
@@ -210,14 +217,10 @@ def _first_misfit(data: Any, schema: Any, where: str) -> str | None:
     if schema is bool and not isinstance(data, bool):
         expected = "true or false"
     elif schema in _SCALARS:
-        try:
-            fits = not isinstance(data, (list, dict, type(None), bool))
-            fits = fits and (schema is not int or int(data) == data)
-            schema(data)
-        except (TypeError, ValueError):
-            fits = False
-        if not fits:
+        if not _is_scalar(schema, data):
             expected = _SCALARS[schema]
+            if isinstance(data, (int, float)) and schema is float:
+                expected = "a finite number"
     elif origin is list:
         if not isinstance(data, list):
             expected = "a list"
@@ -233,6 +236,8 @@ def _first_misfit(data: Any, schema: Any, where: str) -> str | None:
             fields = _fields(schema)
             for key, item in data.items():
                 kind = args[1] if not fields else fields.get(key)
+                if not fields and args[0] is str and not isinstance(key, str):
+                    return f"{where} has the key {key!r}, expected text"
                 if kind is None:
                     continue
                 found = _first_misfit(item, kind, f"{where}.{key}")
@@ -240,4 +245,4 @@ def _first_misfit(data: Any, schema: Any, where: str) -> str | None:
                     return found
     if expected is None:
         return None
-    return f"{where} is {data!r}, expected {expected}"
+    return f"{where} is {shown(data)}, expected {expected}"

@@ -62,7 +62,7 @@ class PidfGains:
 
     def __post_init__(self) -> None:
         """Makes float copies; raises InputError where they do not fit."""
-        self.kP = np.array(self.kP, dtype=float)
+        self.kP = require_array("kP", self.kP)
         require(
             self.kP.ndim == 1 and self.kP.size > 0,
             "kP",
@@ -77,8 +77,12 @@ class PidfGains:
 
     @classmethod
     def from_array(cls, array: ArrayLike) -> Self:
-        """The gains whose rows are kP, kI, kD and kF."""
-        return cls(*np.asarray(array, dtype=float))
+        """The gains whose rows (4, n) are kP, kI, kD and kF.
+
+        Raises:
+            InputError: For another shape, or what is no gain.
+        """
+        return cls(*require_array("array", array, (4, None)))
 
     def to_array(self) -> NDArray[np.float64]:
         """(4, n) array with the rows kP, kI, kD and kF."""

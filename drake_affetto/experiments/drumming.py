@@ -9,10 +9,12 @@ judged by its sound.
 from collections.abc import Iterable, Sequence
 import copy
 import dataclasses
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from drake_affetto.experiments.bodies import draw_robots
 from drake_affetto.experiments.plans import DrumPlan
 from drake_affetto.experiments.results import (
     CurvePoint,
@@ -52,7 +54,7 @@ from drake_affetto.station.scenario import Scenario, SkillConfig, load_scenario
 
 # What a seed of the study is for. Other studies that learn the same skill use
 # those of the demonstrations and the skill too.
-_TESTS, SOURCE, _ORDER, HIDDEN, _TRIALS = range(5)
+_TESTS, SOURCE, _ORDER, HIDDEN, _TRIALS, _BODIES = range(6)
 
 # In place of an order: no skill at all, one and the same stroke everywhere.
 _BLIND = "blind"
@@ -111,8 +113,15 @@ class _Outcome:
         return self.strike.impulse if self.strike else 0.0
 
 
-def run_drum(executor: TrialExecutor, plan: DrumPlan) -> DrumResults:
+def run_drum(
+    executor: TrialExecutor, plan: DrumPlan, folder: Path | None = None
+) -> DrumResults:
     """Runs the study and returns its results; see the module.
+
+    Args:
+        executor: Executor of the study.
+        plan: How much is done.
+        folder: Folder of the results; only bodies need it.
 
     Raises:
         InputError: If the plan does not fit, or too few demonstrations
@@ -120,6 +129,12 @@ def run_drum(executor: TrialExecutor, plan: DrumPlan) -> DrumResults:
     """
     plan.check()
     scenario = load_scenario(plan.scenario)
+    robots = draw_robots(
+        plan.bodies, plan.scenario, (plan.seed, _BODIES), folder
+    )
+    scenarios = [
+        robots.scenario(repeat, plan.scenario) for repeat in range(plan.repeats)
+    ]
     positions = draw_positions(
         scenario, plan.evaluations, np.random.default_rng([plan.seed, _TESTS])
     )
@@ -127,7 +142,7 @@ def run_drum(executor: TrialExecutor, plan: DrumPlan) -> DrumResults:
         teach_positions(
             executor,
             f"Kinesthetic teaching, {repeat + 1} of {plan.repeats}",
-            plan.scenario,
+            scenarios[repeat],
             plan.demonstrations,
             (plan.seed, SOURCE, repeat),
         )
@@ -138,11 +153,13 @@ def run_drum(executor: TrialExecutor, plan: DrumPlan) -> DrumResults:
     seen = look_at_positions(
         executor,
         "Looking at test positions",
-        plan.scenario,
+        scenarios,
         [positions] * plan.repeats,
         (plan.seed, _TRIALS),
     )
-    tests = _plan_tests(plan, scenario, demonstrations, positions, seen)
+    tests = _plan_tests(
+        plan, scenarios, scenario, demonstrations, positions, seen
+    )
     strikes = run_strikes(executor, "Drumming at test positions", tests)
     outcomes = [
         _Outcome(
@@ -156,11 +173,14 @@ def run_drum(executor: TrialExecutor, plan: DrumPlan) -> DrumResults:
     skilled = [each for each in outcomes if each.test.order != _BLIND]
     results = _make_results(plan, scenario, demonstrations, skilled)
     (blind,) = _curve(plan, (o for o in outcomes if o.test.order == _BLIND))
-    return dataclasses.replace(results, chance=blind.success_rate)
+    return dataclasses.replace(
+        results, chance=blind.success_rate, bodies=robots.numbers()
+    )
 
 
 def _plan_tests(
     plan: DrumPlan,
+    scenarios: Sequence[str],
     scenario: Scenario,
     demonstrations: Sequence[Sequence[DemonstrationResult]],
     positions: np.ndarray,
@@ -181,7 +201,7 @@ def _plan_tests(
         for position, xy in enumerate(positions):
             for (order, n), mover in movers.items():
                 tests[_Test(order, repeat, n, position)] = strike_if_seen(
-                    plan.scenario,
+                    scenarios[repeat],
                     xy,
                     trial_seed(plan.seed, _TRIALS, repeat, position),
                     seen[repeat, position],

@@ -203,7 +203,9 @@ class TrialRunner:
         self.voice = DrumVoice(sound.voice)
         self.reward_config = sound.reward
         self.meshcat = meshcat
-        self._palm_chain = world.serial_chain(self.station.plant, "right_palm")
+        self._palm_chain = world.serial_chain(
+            self.station.plant, "affetto::right_palm"
+        )
         self._settled: Context | None = None
         self._looked: _Look | None = None
         self._taps: list[Array] | None = None

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from drake_affetto.experiments.bodies import Robots, draw_robots
 from drake_affetto.experiments.drumming import HIDDEN, SOURCE
 from drake_affetto.experiments.plans import MirrorPlan
 from drake_affetto.experiments.results import (
@@ -50,7 +51,7 @@ from drake_affetto.runner.executor import Spec, TrialExecutor
 from drake_affetto.station.scenario import load_scenario
 
 # What the seeds of this study are for; the skill's are those of the drum study.
-_TARGET, _TESTS, _CHOICE, _TRIALS = range(100, 104)
+_TARGET, _TESTS, _CHOICE, _TRIALS, _KNOWLEDGE, _BODIES = range(100, 106)
 
 # In place of a scheme: no skill at all, one and the same stroke everywhere.
 _BLIND = "blind"
@@ -77,6 +78,8 @@ class MirrorOutcome:
         demonstrations: Demonstrations that these schemes were given.
         positions: Test positions of the first repeat (evaluations, 2), m.
         seen: What the gaze found at these positions.
+        scenarios: Scenarios of the first repeat's robot, by name or path: in
+            direct view, and in the changed one.
     """
 
     results: MirrorResults
@@ -86,6 +89,7 @@ class MirrorOutcome:
     demonstrations: list[DemonstrationResult]
     positions: np.ndarray
     seen: list[GazeResult]
+    scenarios: tuple[str, str]
 
 
 @dataclasses.dataclass
@@ -98,6 +102,7 @@ class _Repeat:
         constant: Movement (F,) of the best constant stroke.
         pool: Demonstrations in the changed view.
         positions: Test positions (evaluations, 2), m.
+        scenario: Scenario of the changed view with this repeat's robot.
     """
 
     skill: Any
@@ -105,6 +110,7 @@ class _Repeat:
     constant: np.ndarray
     pool: list[DemonstrationResult]
     positions: np.ndarray
+    scenario: str
 
 
 @dataclasses.dataclass(frozen=True)
@@ -157,8 +163,15 @@ def choose(
     return np.array(chosen)
 
 
-def run_mirror(executor: TrialExecutor, plan: MirrorPlan) -> MirrorOutcome:
+def run_mirror(
+    executor: TrialExecutor, plan: MirrorPlan, folder: Path | None = None
+) -> MirrorOutcome:
     """Runs the study of one scenario; see the module.
+
+    Args:
+        executor: Executor of the study.
+        plan: What is compared.
+        folder: Folder of the results; only bodies need it.
 
     Raises:
         InputError: If the plan does not fit, or too few demonstrations
@@ -168,14 +181,17 @@ def run_mirror(executor: TrialExecutor, plan: MirrorPlan) -> MirrorOutcome:
     # The name distinguishes the phases of several plans in one store.
     among = f", {plan.name}" if plan.name else ""
     title = Path(plan.scenario).stem + among
+    robots = draw_robots(
+        plan.bodies, plan.scenario, (plan.seed, _BODIES), folder
+    )
     repeats = [
-        _teach(executor, plan, repeat, among, title)
+        _teach(executor, plan, robots, repeat, among, title)
         for repeat in range(plan.repeats)
     ]
     seen = look_at_positions(
         executor,
         f"Looking, {title}",
-        plan.scenario,
+        [each.scenario for each in repeats],
         [each.positions for each in repeats],
         (plan.seed, _TRIALS),
     )
@@ -195,7 +211,12 @@ def run_mirror(executor: TrialExecutor, plan: MirrorPlan) -> MirrorOutcome:
                 np.random.default_rng([plan.seed, _CHOICE, number, count]),
             )
             samples = [repeat.pool[i] for i in chosen]
-            schemes = _fit_schemes(plan, repeat.skill, samples)
+            schemes = _fit_schemes(
+                plan,
+                repeat.skill,
+                samples,
+                trial_seed(plan.seed, _KNOWLEDGE, number),
+            )
             movers |= {(name, count): each for name, each in schemes.items()}
             if number == 0 and count == max(plan.samples):
                 shown, shown_samples = schemes, samples
@@ -203,7 +224,7 @@ def run_mirror(executor: TrialExecutor, plan: MirrorPlan) -> MirrorOutcome:
         for position, xy in enumerate(repeat.positions):
             for (name, count), mover in movers.items():
                 tests[_Test(name, count, number, position)] = strike_if_seen(
-                    plan.scenario,
+                    repeat.scenario,
                     xy,
                     trial_seed(plan.seed, _TRIALS, number, position),
                     seen[number, position],
@@ -213,19 +234,23 @@ def run_mirror(executor: TrialExecutor, plan: MirrorPlan) -> MirrorOutcome:
     outcomes = run_strikes(executor, f"Drumming, {title}", tests)
     first = repeats[0]
     return MirrorOutcome(
-        results=_make_results(plan, outcomes, _map(plan, shown, shown_samples)),
+        results=_make_results(
+            plan, robots, outcomes, _map(plan, shown, shown_samples)
+        ),
         skill=first.skill,
         schemes=shown,
         prototypes=first.prototypes,
         demonstrations=shown_samples,
         positions=first.positions,
         seen=[seen[0, i] for i in range(plan.evaluations)],
+        scenarios=(robots.scenario(0, plan.direct), first.scenario),
     )
 
 
 def _teach(
     executor: TrialExecutor,
     plan: MirrorPlan,
+    robots: Robots,
     repeat: int,
     among: str,
     title: str,
@@ -235,7 +260,7 @@ def _teach(
         teach_positions(
             executor,
             f"Kinesthetic teaching{view}, {repeat + 1} of {plan.repeats}",
-            scenario,
+            robots.scenario(repeat, scenario),
             count,
             (plan.seed, use, repeat),
             variability=plan.variability,
@@ -261,23 +286,34 @@ def _teach(
             np.random.default_rng([plan.seed, _TESTS, repeat]),
             plan.workspace,
         ),
+        scenario=robots.scenario(repeat, plan.scenario),
     )
 
 
 def _fit_schemes(
-    plan: MirrorPlan, skill: Any, samples: Sequence[DemonstrationResult]
+    plan: MirrorPlan,
+    skill: Any,
+    samples: Sequence[DemonstrationResult],
+    knowledge: int,
 ) -> dict[str, Any]:
-    """All schemes of the plan, fitted to the same samples."""
+    """All schemes of the plan, fitted to the same samples.
+
+    `knowledge` is the seed of how wrongly the robot knows its camera, the
+    same for all numbers of samples.
+    """
     tau = task_parameters(samples)
     theta = np.array([each.theta for each in samples])
     return {
-        name: fit_scheme(name, skill, tau, theta, plan.scenario, plan.direct)
+        name: fit_scheme(
+            name, skill, tau, theta, plan.scenario, plan.direct, knowledge
+        )
         for name in plan.schemes
     }
 
 
 def _make_results(
     plan: MirrorPlan,
+    robots: Robots,
     outcomes: Mapping[_Test, StrikeResult | None],
     example: TransferMap | None,
 ) -> MirrorResults:
@@ -315,6 +351,7 @@ def _make_results(
         ),
         map=example,
         chance=success_rate(_successes(_table(plan, outcomes, _BLIND, 0))),
+        bodies=robots.numbers(),
     )
 
 

@@ -11,6 +11,7 @@ from drake_affetto.experiments.episode import GuidedMovement, TrialRunner
 from drake_affetto.experiments.results import DemonstrationResult
 from drake_affetto.experiments.teaching_session import TeachingSession
 from drake_affetto.experiments.trials import demonstrate
+from drake_affetto.scene.parts import find_frame
 from drake_affetto.station.scenario import Scenario
 from drake_affetto.teaching.mouse_teacher import require_mouse_spring
 
@@ -66,7 +67,7 @@ class MouseTeachingRunner(TrialRunner):
 
     def _palm(self) -> np.ndarray:
         plant = self.station.plant
-        palm = plant.GetFrameByName("right_palm")
+        palm = find_frame(plant, "affetto::right_palm")
         return palm.CalcPoseInWorld(self._sub(plant)).translation()
 
     def _light(self, color: Rgba) -> None:

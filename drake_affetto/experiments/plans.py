@@ -7,7 +7,7 @@ import dataclasses
 
 from drake_affetto.common.errors import require, require_choice, require_range
 from drake_affetto.common.fields import check_ranges, number, option
-from drake_affetto.skill.scheme_names import PAPER_SCHEMES, STUDY_SCHEMES
+from drake_affetto.skill.scheme_names import PAPER_SCHEMES, SCHEMES
 
 GREATEST_SEED = 2**31 - 1
 
@@ -15,6 +15,12 @@ GREATEST_SEED = 2**31 - 1
 @dataclasses.dataclass(frozen=True)
 class Plan:
     """The plan of a study; fields with a help are options of its command."""
+
+    def __post_init__(self) -> None:
+        """Each body has a repeat of its own."""
+        bodies = getattr(self, "bodies", 0)
+        if isinstance(bodies, int) and bodies > 0:
+            object.__setattr__(self, "repeats", bodies)
 
     def check(self) -> None:
         """Raises InputError for the first value that does not fit."""
@@ -30,6 +36,8 @@ class DrumPlan(Plan):
         evaluations: Number of test positions, the same throughout the study.
         repeats: Number of times that all of it is done, each with other
             demonstrations.
+        bodies: Number of robots of other bodies, each with a repeat of its
+            own: they take the place of `repeats`. 0: one robot throughout.
         active: Whether the skill's own order is tried too.
         after: Numbers of demonstrations after which the skill is tested; empty
             for every one. After the last it always is.
@@ -45,6 +53,9 @@ class DrumPlan(Plan):
     )
     repeats: int = number(
         1, 1, 1000, "independent repeats, each with other demonstrations"
+    )
+    bodies: int = number(
+        0, 0, 1000, "robots of other bodies, a repeat each; 0: one robot"
     )
     active: bool = option(
         False, "also let the skill choose which demonstration comes next"
@@ -77,12 +88,14 @@ class MirrorPlan(Plan):
         samples: Numbers of demonstrations that the schemes are given.
         repeats: Number of times that all of it is done, each with another
             skill, other demonstrations and other test positions.
+        bodies: Number of robots of other bodies, each with a repeat of its
+            own: they take the place of `repeats`. 0: one robot throughout.
         evaluations: Number of test positions of a repeat.
         demonstrations: Number of demonstrations in direct view, from which
             the skill is learned.
         pool: Number of demonstrations in the changed view, from which samples
             are drawn; None for the paper's 6, or as many as the most samples.
-        schemes: Schemes that are compared, see `STUDY_SCHEMES`.
+        schemes: Schemes that are compared, see `SCHEMES`.
         choice: How samples are chosen, at "random" or "spread" out.
         variability: Factor of the teacher's variation.
         workspace: Share of the region's length and width that is used.
@@ -93,17 +106,23 @@ class MirrorPlan(Plan):
 
     scenario: str = "mirror"
     samples: tuple[int, ...] = number(
-        (2, 3, 4, 5), 2, 100, "numbers of demonstrations that schemes are given"
+        (1, 2, 3, 4, 5),
+        1,
+        100,
+        "numbers of demonstrations schemes are given",
     )
     repeats: int = number(
         20, 1, 1000, "independent repeats, each with another skill and teacher"
+    )
+    bodies: int = number(
+        0, 0, 1000, "robots of other bodies, a repeat each; 0: one robot"
     )
     evaluations: int = number(8, 1, 1000, "number of test positions a repeat")
     demonstrations: int = number(
         25, 3, 1000, "number of demonstrations in direct view"
     )
     pool: int | None = None
-    schemes: tuple[str, ...] = STUDY_SCHEMES
+    schemes: tuple[str, ...] = SCHEMES
     choice: str = "random"
     variability: float = number(1.0, 0.0, 10.0)
     workspace: float = number(1.0, 0.05, 1.0)

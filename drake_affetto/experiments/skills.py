@@ -25,9 +25,15 @@ from drake_affetto.experiments.trials import (
 from drake_affetto.geometry.region import grid_inside
 from drake_affetto.runner.executor import Key, Spec, TrialExecutor
 from drake_affetto.station.content import Content, scenario_content
-from drake_affetto.station.scenario import Scenario, SkillConfig, load_scenario
+from drake_affetto.station.scenario import (
+    Scenario,
+    SkillConfig,
+    TransferConfig,
+    load_scenario,
+)
 
 if TYPE_CHECKING:
+    from drake_affetto.perception.optical_map import OpticalMap
     from drake_affetto.skill.elm import ElmRegressor
     from drake_affetto.skill.mappings import Mapping as MapFamily
 
@@ -176,7 +182,7 @@ def teach_positions(
 def look_at_positions(
     executor: TrialExecutor,
     label: str,
-    scenario: str,
+    scenarios: Sequence[str],
     positions: Sequence[np.ndarray],
     seed: Sequence[int],
 ) -> dict[tuple[int, int], GazeResult]:
@@ -185,7 +191,7 @@ def look_at_positions(
     Args:
         executor: Executor of the study.
         label: Name of this phase of the study.
-        scenario: Scenario, by name or path.
+        scenarios: Scenario of each repeat, by name or path.
         positions: Test positions of each repeat, (count, 2) each, m.
         seed: Seed of the noise, as several numbers.
 
@@ -197,7 +203,9 @@ def look_at_positions(
         label,
         {
             (repeat, i): look(scenario, xy, trial_seed(*seed, repeat, i))
-            for repeat, each in enumerate(positions)
+            for repeat, (scenario, each) in enumerate(
+                zip(scenarios, positions, strict=True)
+            )
             for i, xy in enumerate(each)
         },
     )
@@ -271,6 +279,7 @@ def fit_scheme(
     theta: np.ndarray,
     scenario: str,
     direct: str,
+    seed: int = 0,
 ) -> Any:
     """One scheme of the paper's comparison, fitted to what is new.
 
@@ -281,6 +290,7 @@ def fit_scheme(
         theta: (N, F) demonstrated there.
         scenario: of the new condition, by name or path.
         direct: in which the skill was learned, by name or path.
+        seed: of the errors with which the optical map knows the camera.
 
     Returns:
         A fitted regressor from τ̂ to θ.
@@ -294,12 +304,7 @@ def fit_scheme(
     scheme = make_scheme(name, source, input_range=loaded.skill.input_range)
     if name == "transfer_default":
         scheme.set_params(
-            mapping=_mapping(
-                scenario,
-                direct,
-                loaded.transfer.mapping,
-                (scenario_content(scenario), scenario_content(direct)),
-            ),
+            mapping=_mapping(loaded.transfer, scenario, direct, seed),
             residual="smooth" if loaded.transfer.residual else None,
         )
     with warnings.catch_warnings():
@@ -308,18 +313,34 @@ def fit_scheme(
         return scheme.fit(tau, theta)
 
 
-@functools.cache
 def _mapping(
-    scenario: str, direct: str, name: str, _: tuple[Content, Content]
+    transfer: TransferConfig, scenario: str, direct: str, seed: int
 ) -> "str | MapFamily":
-    """The family of maps that a scenario of this content names."""
-    if name != "optical":
-        return name
+    """The family of maps that a scenario names."""
+    if transfer.mapping != "optical":
+        return transfer.mapping
+    from drake_affetto.experiments.view_maps import with_wrong_camera
+    from drake_affetto.skill.optical import OpticalMapping
+
+    exact = _optical_map(
+        scenario,
+        direct,
+        (scenario_content(scenario), scenario_content(direct)),
+    )
+    believed = with_wrong_camera(
+        exact, transfer.errors, np.random.default_rng(seed)
+    )
+    return OpticalMapping(**vars(believed) | {"plane": transfer.plane})
+
+
+@functools.cache
+def _optical_map(
+    scenario: str, direct: str, _: tuple[Content, Content]
+) -> "OpticalMap":
+    """The optical map between scenarios of that content, all known exactly."""
     from drake_affetto.experiments.view_maps import (
         ViewDomain,
         make_optical_map,
     )
-    from drake_affetto.skill.optical import OpticalMapping
 
-    optical = make_optical_map(ViewDomain.of(scenario), ViewDomain.of(direct))
-    return OpticalMapping(**vars(optical))
+    return make_optical_map(ViewDomain.of(scenario), ViewDomain.of(direct))

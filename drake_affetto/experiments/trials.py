@@ -54,6 +54,10 @@ from drake_affetto.station.scenario import Scenario, load_scenario
 # it, what led to the scenario.
 _RUNNERS: dict[Content, tuple[str, TrialRunner]] = {}
 
+# Each keeps a Diagram with its renderers, 36 MiB. Studies of many bodies go
+# from one to the next; an own order of two scenarios needs no more either.
+_MOST_RUNNERS = 6
+
 NAME = "@name"
 """Entry of a spec's scenario that says what leads to it."""
 
@@ -95,6 +99,9 @@ def runner_of(entry: Mapping[str, Any]) -> TrialRunner:
             # What its files held before is not asked for again.
             if source == name:
                 del _RUNNERS[old]
+        # The least recently built of too many goes.
+        while len(_RUNNERS) >= _MOST_RUNNERS:
+            del _RUNNERS[next(iter(_RUNNERS))]
         _RUNNERS[content] = name, built
     return _RUNNERS[content][1]
 

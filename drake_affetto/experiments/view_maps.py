@@ -13,18 +13,18 @@ import numpy as np
 from pydrake.systems.framework import Context
 from scipy.optimize import least_squares
 
+from drake_affetto.common.errors import require
 from drake_affetto.common.typing import Array
 from drake_affetto.experiments.camera_preview import (
     GazeGeometry,
     make_gaze_geometry,
     turn_to,
 )
-from drake_affetto.geometry.optics import make_pose
 from drake_affetto.geometry.region import grid_inside
 from drake_affetto.perception.blob import BlobCalibration
-from drake_affetto.perception.camera_model import CameraModel
-from drake_affetto.perception.config import rotation_matrix
+from drake_affetto.perception.knowledge import CalibrationError, believed
 from drake_affetto.perception.optical_map import OpticalMap
+from drake_affetto.scene.parts import find_frame
 from drake_affetto.station.scenario import load_scenario
 from drake_affetto.station.station import AffettoStation
 
@@ -67,7 +67,7 @@ class ViewDomain:
 
     def base_pose(self) -> Array:
         """X_WB (4, 4) of the robot's base."""
-        frame = self.station.plant.GetFrameByName("affetto_base")
+        frame = find_frame(self.station.plant, "affetto_base")
         context = self.station.plant.GetMyContextFromRoot(self.context)
         return frame.CalcPoseInWorld(context).GetAsMatrix4()
 
@@ -250,68 +250,34 @@ def _linear(
 
 
 def make_optical_map(view: ViewDomain, reference: ViewDomain) -> OpticalMap:
-    """The optical map of a mirrored view, everything but the mirror known."""
-    assert view.sight.fixed_yaw is not None
+    """The optical map of a mirrored view, everything but the mirror known.
+
+    Raises:
+        InputError: If the view is not one from a fixed yaw.
+    """
+    yaw = view.sight.fixed_yaw
+    require(
+        yaw is not None,
+        f"{view.name}.transfer.mapping",
+        "optical",
+        "another map where the robot turns to the drum",
+    )
+    assert yaw is not None
     return OpticalMap(
         view.sight.model,
         view.calibration,
-        view.sight.fixed_yaw,
+        yaw,
         reference.sight.model,
         reference.calibration,
     )
 
 
-@dataclasses.dataclass(frozen=True)
-class CalibrationError:
-    """How wrong the camera is known.
-
-    Attributes:
-        focal: relative error of the focal length.
-        angle: error of its orientation [rad].
-        position: error of its place [m].
-    """
-
-    focal: float = 0.0
-    angle: float = 0.0
-    position: float = 0.0
-
-
-def with_error(
-    model: CameraModel, error: CalibrationError, rng: np.random.Generator
-) -> CameraModel:
-    """The sight as it is believed to be, wrong in a random direction."""
-    sign = rng.choice([-1.0, 1.0])
-    camera = dataclasses.replace(
-        model.camera,
-        focal_x=model.camera.focal_x * (1.0 + sign * error.focal),
-        focal_y=model.camera.focal_y * (1.0 + sign * error.focal),
-    )
-    axis, way = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
-    # For a small angle, the rotation vector is roll, pitch and yaw.
-    X_CC = make_pose(rotation_matrix(error.angle * axis), error.position * way)
-    return dataclasses.replace(model, camera=camera, X_AC=model.X_AC @ X_CC)
-
-
 def with_wrong_camera(
-    optical: OpticalMap,
-    view: ViewDomain,
-    reference: ViewDomain,
-    error: CalibrationError,
-    rng: np.random.Generator,
+    optical: OpticalMap, error: CalibrationError, rng: np.random.Generator
 ) -> OpticalMap:
-    """The optical map with the camera's calibration wrong, in both views.
-
-    It is one camera: the same error in its focal length and in where it sits
-    on its frame.
-    """
-    seed = int(rng.integers(2**31))
-    return dataclasses.replace(
-        optical,
-        target=with_error(view.sight.model, error, np.random.default_rng(seed)),
-        source=with_error(
-            reference.sight.model, error, np.random.default_rng(seed)
-        ),
-    )
+    """The optical map with the camera known wrongly, see `believed`."""
+    target, source = believed((optical.target, optical.source), error, rng)
+    return dataclasses.replace(optical, target=target, source=source)
 
 
 @dataclasses.dataclass(frozen=True)

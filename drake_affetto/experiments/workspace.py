@@ -30,6 +30,7 @@ from drake_affetto.perception.camera_model import (
     seen_in_mirror,
 )
 from drake_affetto.scene import world
+from drake_affetto.scene.parts import find_frame
 
 # Bodies that may touch each other when the hand strikes.
 _STRIKE = {"affetto::right_hand", "drum::head"}
@@ -251,7 +252,7 @@ def _see(
     facing: Mapping[str, float],
 ) -> _Seen:
     """How the marker is seen in both postures."""
-    eye = world.serial_chain(plant, "eye_camera")
+    eye = world.serial_chain(plant, "affetto::eye_camera")
     rise = world.marker_position(plant, context)[2]
     radius = world.marker_radius(plant, context)
     camera = PinholeCamera.from_fov(config.width, config.height, config.fov_y)
@@ -260,7 +261,7 @@ def _see(
     )
     marker = model.marker(xy)
     rim = marker[:, None] + disc_outline(np.zeros(3), _UP, radius)
-    X_WM = plant.GetFrameByName("mirror").CalcPoseInWorld(context)
+    X_WM = find_frame(plant, "mirror::mirror").CalcPoseInWorld(context)
     X_WM = X_WM.GetAsMatrix4()
     size = world.mirror_size(plant, context)
 
@@ -336,7 +337,7 @@ def _reach(
         Whether it can (m,), and the striking postures of the active joints
         (m, n), rad.
     """
-    palm = world.serial_chain(plant, "right_palm")
+    palm = world.serial_chain(plant, "affetto::right_palm")
     weights = np.array(
         [
             0.0

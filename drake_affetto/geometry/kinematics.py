@@ -9,6 +9,7 @@ import dataclasses
 
 import numpy as np
 
+from drake_affetto.common.errors import require, require_array, require_range
 from drake_affetto.common.typing import Array
 
 
@@ -32,6 +33,22 @@ class SerialChain:
     X_JT: Array
     lower: Array
     upper: Array
+
+    def __post_init__(self) -> None:
+        """Raises InputError for arrays that do not fit n joints."""
+        n = len(self.names)
+        require_array("X_PJ", self.X_PJ, (n, 4, 4))
+        require_array("axes", self.axes, (n, 3))
+        require_array("X_JT", self.X_JT, (4, 4))
+        for name in ("lower", "upper"):
+            limits = np.asarray(getattr(self, name), dtype=float)
+            # A joint may have no limits: they are infinite then.
+            require(
+                limits.shape == (n,) and not np.isnan(limits).any(),
+                name,
+                limits.tolist(),
+                f"a limit for each of {n} joints",
+            )
 
     def indices(self, names: list[str] | tuple[str, ...]) -> Array:
         """Where `names` stand among the chain's joints."""
@@ -57,6 +74,8 @@ class SerialChain:
 
     def _walk(self, q: Array) -> tuple[Array, Array, Array]:
         q = np.asarray(q, dtype=float)
+        if q.shape[-1:] != (len(self.names),):
+            require_array("q", q, (*q.shape[:-1], len(self.names)))
         X = np.broadcast_to(np.eye(4), (*q.shape[:-1], 4, 4))
         axes = np.empty((*q.shape, 3))
         origins = np.empty((*q.shape, 3))
@@ -110,9 +129,22 @@ def solve_position(
 
     Returns:
         (m, n) postures and (m,) distances [m] left to the targets.
+
+    Raises:
+        InputError: For an argument that is not finite or does not fit.
     """
-    targets = np.asarray(targets, dtype=float)
+    targets = require_array("targets", targets, (None, 3))
     shape = (len(targets), len(chain.names))
+    weights = require_array("weights", weights, shape[1:], low=0.0)
+    for name, posture in (("rest", rest), ("start", start)):
+        if posture is not None and np.shape(posture) not in (shape, shape[1:]):
+            require_array(name, posture, shape)
+        if posture is not None:
+            require_array(name, posture)
+    require_range("margin", margin, 0.0, 0.5)
+    require_range("damping", damping, 1e-9, 1e3)
+    require_range("comfort", comfort, 0.0, 1.0)
+    require_range("iterations", iterations, 1, 1_000_000)
     rest = np.broadcast_to(np.asarray(rest, dtype=float), shape)
     q = np.array(np.broadcast_to(rest if start is None else start, shape))
     free = weights > 0

@@ -17,6 +17,7 @@ import math
 
 import numpy as np
 
+from drake_affetto.common.errors import require_range
 from drake_affetto.common.typing import Array, Mask
 
 
@@ -86,7 +87,12 @@ class PinholeCamera(_ImagePlane):
 
     @classmethod
     def from_fov(cls, width: int, height: int, fov_y: float) -> "PinholeCamera":
-        """Square pixels and a central principal point; fov_y in rad."""
+        """Square pixels and a central principal point; fov_y in rad.
+
+        Raises:
+            InputError: For a size below one pixel, or an angle not in (0, π).
+        """
+        _check_image(width, height, fov_y, 3.14)
         focal = 0.5 * height / math.tan(0.5 * fov_y)
         return cls(width, height, focal, focal, 0.5 * width, 0.5 * height)
 
@@ -164,7 +170,15 @@ class FisheyeCamera(_ImagePlane):
         k1: float = 0.0,
         k2: float = 0.0,
     ) -> "FisheyeCamera":
-        """Square pixels and a central principal point; fov_y in rad."""
+        """Square pixels and a central principal point; fov_y in rad.
+
+        Raises:
+            InputError: For a size below one pixel, an angle not in (0, 2π), or
+                coefficients that are not finite.
+        """
+        _check_image(width, height, fov_y, 6.28)
+        for name, value in (("k1", k1), ("k2", k2)):
+            require_range(name, value, -10.0, 10.0)
         unit = cls(width, height, 1.0, 1.0, 0.0, 0.0, k1, k2)
         focal = 0.5 * height / float(unit._radius(np.array(0.5 * fov_y)))
         return dataclasses.replace(
@@ -530,3 +544,10 @@ def yaw_sensitivity(
         return float(camera.project(p_C)[0])
 
     return (u_at(step) - u_at(-step)) / (2 * step)
+
+
+def _check_image(width: int, height: int, fov_y: float, widest: float) -> None:
+    """Raises InputError for an image that no camera has."""
+    require_range("width", width, 1, 100_000)
+    require_range("height", height, 1, 100_000)
+    require_range("fov_y", fov_y, 1e-4, widest)

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
+from drake_affetto.common.errors import require, require_array, require_range
 from drake_affetto.common.typing import Array, Mask
 from drake_affetto.geometry.optics import polygon_area
 
@@ -64,8 +65,12 @@ def grid_inside(corners: ArrayLike, n: int) -> Array:
     """Points of an n × n grid over a polygon's box that are inside (m, 2).
 
     The corners themselves come with them, so that no extreme is missed.
+
+    Raises:
+        InputError: For corners that are no polygon, or n below 2.
     """
-    polygon = np.asarray(corners, dtype=float)
+    polygon = _polygon(corners)
+    require_range("n", n, 2, 10_000)
     low, high = polygon.min(axis=0), polygon.max(axis=0)
     axes = (np.linspace(low[i], high[i], n) for i in range(2))
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 2)
@@ -86,12 +91,18 @@ def spread_inside(
         corners: (k, 2), of a polygon with an area above 0.
         count: number of points.
         rng: source of randomness.
+
+    Raises:
+        InputError: For corners that are no polygon with an area, or no count.
     """
     from scipy.stats import qmc
 
-    polygon = np.asarray(corners, dtype=float)
+    polygon = _polygon(corners)
+    require_range("count", count, 0, 1_000_000)
     low, high = polygon.min(axis=0), polygon.max(axis=0)
-    share = float(polygon_area(polygon) / np.prod(high - low))
+    area = float(polygon_area(polygon))
+    require(area > 0.0, "corners", polygon.tolist(), "a polygon with an area")
+    share = area / float(np.prod(high - low))
     bits = max(1, int(np.ceil(np.log2(max(count / share, 2)))))
     while True:
         points = low + qmc.Sobol(2, rng=rng).random_base2(bits) * (high - low)
@@ -99,3 +110,10 @@ def spread_inside(
         if len(points) >= count:
             return np.asarray(points[:count])
         bits += 1
+
+
+def _polygon(corners: ArrayLike) -> Array:
+    """Corners (k, 2), k at least 3; raises InputError for others."""
+    polygon = require_array("corners", corners, (None, 2))
+    require(len(polygon) >= 3, "corners", polygon.tolist(), "at least three")
+    return polygon

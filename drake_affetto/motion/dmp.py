@@ -141,7 +141,7 @@ class Dmp:
 
     def basis(self, phase: ArrayLike) -> Array:
         """The normalized basis functions ψ(x): phase (N,) to (N, K)."""
-        phase = np.atleast_1d(np.asarray(phase, dtype=float))
+        phase = np.atleast_1d(require_array("phase", phase))
         exponent = (phase[:, None] - self._centers) ** 2
         # Subtracting the least leaves the quotient as it is, and keeps it a
         # number where every Gaussian has underflowed.
@@ -156,7 +156,7 @@ class Dmp:
         Raises:
             InputError: if its size is no multiple of K or it is not finite.
         """
-        theta = np.asarray(theta, dtype=float)
+        theta = _finite("theta", theta)
         require(
             theta.ndim == 1
             and theta.size > 0
@@ -165,7 +165,6 @@ class Dmp:
             theta.shape,
             f"(n * {self.n_basis},) for n joints",
         )
-        _require_finite("theta", theta)
         return theta.reshape(-1, self.n_basis)
 
     def rollout(
@@ -276,10 +275,17 @@ class Dmp:
         return phase, state[0], state[1]
 
     def step_table(self, dt: float, duration: float) -> StepTable:
-        """What steps of length dt need, made once and then remembered."""
-        return self._tables.get(
-            (dt, duration), lambda: self._make_table(dt, duration)
-        )
+        """What steps of length dt need, made once and then remembered.
+
+        Raises:
+            InputError: For a dt or a duration that cannot be.
+        """
+
+        def make() -> StepTable:
+            require_range("dt", dt, 1e-6, 1e3)
+            return self._make_table(dt, self._duration(duration))
+
+        return self._tables.get((dt, duration), make)
 
     def advance(
         self,
@@ -378,9 +384,8 @@ class Dmp:
         return float(duration)
 
     def _posture(self, field: str, value: ArrayLike, n: int) -> Array:
-        value = np.asarray(value, dtype=float)
+        value = _finite(field, value)
         require(value.shape == (n,), f"{field}.shape", value.shape, f"({n},)")
-        _require_finite(field, value)
         return value
 
     def _check_demonstration(
@@ -398,8 +403,6 @@ class Dmp:
             q.shape,
             f"({len(t)}, n), a posture for each instant",
         )
-        _require_finite("t", t)
-        _require_finite("q", q)
         require(
             bool(np.all(np.diff(t) > 0.0)), "t", "unordered", "increasing times"
         )
@@ -580,7 +583,13 @@ class Dmp:
         )
 
 
-def _require_finite(field: str, value: Array) -> None:
+def _finite(field: str, value: ArrayLike) -> Array:
+    """`value` as an array of finite numbers; raises InputError by name."""
     # The sum of finite numbers of a sane size is finite, and is one call.
-    if not math.isfinite(value.sum()):
-        require_array(field, value)
+    if (
+        isinstance(value, np.ndarray)
+        and value.dtype == np.float64
+        and math.isfinite(value.sum())
+    ):
+        return value
+    return require_array(field, value)

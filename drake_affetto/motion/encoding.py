@@ -10,6 +10,7 @@ from scipy.linalg import cho_factor, cho_solve
 from drake_affetto.common.errors import (
     InputError,
     require,
+    require_array,
 )
 from drake_affetto.common.typing import Array
 
@@ -87,7 +88,7 @@ def pair_demonstrations(t: Any, q: Any) -> list[tuple[Array, Array]]:
         f"{len(t)}, one for each array of times",
     )
     pairs = [
-        (np.asarray(a, dtype=float), np.asarray(b, dtype=float))
+        (require_array("t", a), require_array("q", b))
         for a, b in zip(t, q, strict=True)
     ]
     widths = {b.shape[-1] if b.ndim else 0 for _, b in pairs}

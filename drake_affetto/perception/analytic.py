@@ -36,6 +36,8 @@ _RIM = 0.09
 # Error of a completed marker: standard deviation for all hidden at area 1.
 _COMPLETION = 30.0
 _LEAST_TO_COMPLETE = 60.0
+# Share of the marker of which less is not found.
+_LEAST_SEEN = 0.5
 
 _SAMPLES = 60
 
@@ -226,6 +228,16 @@ def _hits(X_WE: Array, radii: Array, start: Array, end: Array) -> Mask:
     s = np.clip(-np.einsum("ij,ij->i", a, d) / np.maximum(dd, 1e-12), 0, 1)
     nearest = a + s[:, None] * d
     return np.einsum("ij,ij->i", nearest, nearest) < 1.0
+
+
+def too_little_seen(area: float, whole_area: float) -> bool:
+    """Whether so little is seen that the blob detection believes no middle.
+
+    Args:
+        area: of what is seen [pixels²].
+        whole_area: of the whole marker's image [pixels²].
+    """
+    return _LEAST_TO_COMPLETE <= area < _LEAST_SEEN * whole_area
 
 
 def completed(

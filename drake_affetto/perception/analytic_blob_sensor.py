@@ -20,6 +20,7 @@ from drake_affetto.perception.analytic import (
     Occluders,
     completed,
     measured_blob,
+    too_little_seen,
     visible_marker,
 )
 from drake_affetto.perception.blob import Blob, BlobConfig
@@ -28,8 +29,8 @@ from drake_affetto.perception.config import CameraConfig
 from drake_affetto.perception.mirror_camera import (
     CameraSnapshot,
     MirrorCamera,
-    find_frame,
 )
+from drake_affetto.scene.parts import find_frame
 
 
 class AnalyticBlobSensor(BlobReporter):
@@ -86,7 +87,7 @@ class AnalyticBlobSensor(BlobReporter):
         self._camera = camera
         self._model = camera.model()
         self._radius = radius
-        frame = find_frame(plant, marker)
+        frame = find_frame(plant, marker, "marker")
         self._marker_id = _frame_id(plant, frame.body().index())
         self._X_BD = frame.GetFixedPoseInBodyFrame()
         self._robot_ids: list[FrameId] = []
@@ -171,6 +172,8 @@ class AnalyticBlobSensor(BlobReporter):
                 self._radius,
                 None if index == 0 else sight.mirrors[index - 1].X_WM,
             )
+            if too_little_seen(area, whole_area):
+                return None
             centroid = completed(area, centroid, whole_area, whole, sight.seed)
         image_area = self._model.width * self._model.height
         return measured_blob(

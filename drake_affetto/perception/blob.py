@@ -6,8 +6,9 @@ has that hue. Pixel coordinates are those of `optics`: integers at the centers
 of the pixels.
 """
 
+from collections.abc import Sequence
 import dataclasses
-import functools
+import itertools
 import math
 from typing import Any
 
@@ -18,6 +19,14 @@ from drake_affetto.common.errors import InputError, require, require_range
 from drake_affetto.common.fields import check_ranges, number
 from drake_affetto.common.typing import Array, Image
 from drake_affetto.perception.config import require_vector
+from drake_affetto.perception.ellipses import (
+    ON_RIM,
+    Ellipse,
+    find_rim,
+    fit_arcs,
+    fit_outline,
+)
+from drake_affetto.perception.hue_gate import coarse_gate, gate, marker_lab
 
 
 @dataclasses.dataclass
@@ -83,9 +92,17 @@ def calibrate(
             the gaze centers the marker, so that its x says nothing).
 
     Raises:
-        InputError: if the marker was seen at fewer than 3 places.
+        InputError: if the marker was seen at fewer than 3 places, or an
+            argument does not fit.
     """
     uv = np.asarray(uv, dtype=float)
+    require(
+        uv.ndim == 2 and uv.shape[1] == 2,
+        "uv",
+        f"an array of shape {uv.shape}",
+        "pixels (n, 2)",
+    )
+    require_range("margin", margin, 0.0, 10.0)
     seen = uv[np.all(np.isfinite(uv), axis=1)]
     if len(seen) < 3:
         raise InputError(
@@ -118,7 +135,8 @@ class BlobConfig:
         region: part of the image to look at: left, upper, right, lower edge
             as fractions of width and height.
         complete: whether a marker that is hidden in part is completed to the
-            ellipse that its rim is part of.
+            ellipse that its rim is part of, and parts of one are put together.
+        min_confidence: least confidence of a blob that is reported.
         detector: "moments", or "simple" for OpenCV's SimpleBlobDetector.
         calibration: the pixels that are x_img, y_img = 0 and 1.
     """
@@ -136,6 +154,7 @@ class BlobConfig:
         default_factory=lambda: [0.0, 0.0, 1.0, 1.0]
     )
     complete: bool = True
+    min_confidence: float = number(0.35, 0.0, 1.0)
     detector: str = "moments"
     calibration: BlobCalibration = dataclasses.field(
         default_factory=BlobCalibration
@@ -188,68 +207,36 @@ class Blob:
 # Rims of fewer pixels do not tell an ellipse from another [pixels²].
 _LEAST_TO_COMPLETE = 60.0
 # How far a whole marker's rim is off its ellipse, at most of it [pixels].
-_ROUGH = 0.75
-# What lies this near to an ellipse is on it [pixels].
-_ON_RIM = 0.6
+_ROUGH = 0.68
+# The same of a large one, by the root of its area, for lens and lattice.
+_ROUGHER = 0.03
+# How far a rim is outside of the ellipse that it is a part of [pixels].
+_BEYOND = 0.75
+# How far a small whole rim is off, where beside it there is more of its hue
+# [pixels], and what is small [pixels²].
+_CLEAN = 0.55
+_SMALL = 150.0
+# Of a whole that is completed from its parts, the share that is seen, and of
+# one put together the share of its rim.
+_LEAST_SEEN = 0.5
+_LEAST_COVERED = 0.65
+# Parts that are looked at, and of those the ones that may belong together.
+_MOST_PARTS = 8
+_MOST_JOINED = 6
+# What becomes of the confidence in a part whose whole is not found.
+_DOUBT = 0.3
 
 
-def marker_lab(color: list[float]) -> tuple[float, float, float]:
-    """(lightness, chroma, hue [rad]) of a color, in OpenCV's 8-bit Lab."""
-    rgb = np.array([[color]], dtype=float)
-    pixel = np.rint(255 * rgb).astype(np.uint8)
-    lab = cv2.cvtColor(pixel, cv2.COLOR_RGB2Lab)[0, 0].astype(float)
-    a, b = lab[1] - 128.0, lab[2] - 128.0
-    return float(lab[0]), math.hypot(a, b), math.atan2(b, a)
-
-
-@functools.lru_cache(maxsize=32)
-def _gate(
-    color: tuple[float, ...], hue_tolerance: float, chroma: float
-) -> Image:
-    """Table (256 · 256,) over (a, b): 255 where a color may be the marker."""
-    _, marker_chroma, marker_hue = marker_lab(list(color))
-    a, b = np.meshgrid(
-        np.arange(256) - 128.0, np.arange(256) - 128.0, indexing="ij"
-    )
-    difference = np.arctan2(b, a) - marker_hue
-    difference = np.abs((difference + np.pi) % (2 * np.pi) - np.pi)
-    inside = (difference <= math.radians(hue_tolerance)) & (
-        np.hypot(a, b) >= chroma * marker_chroma
-    )
-    return np.where(inside, 255, 0).astype(np.uint8).ravel()
-
-
-@functools.lru_cache(maxsize=32)
-def _coarse_gate(
-    color: tuple[float, ...], hue_tolerance: float, chroma: float
-) -> tuple[tuple[Image, Image], ...]:
-    """Boxes of OpenCV's HSV that hold all that passes the gate in Lab.
-
-    HSV takes a quarter of the time of Lab; it says where Lab is worth it.
-    """
-    level = np.append(np.arange(0, 256, 6), 255).astype(np.uint8)
-    rgb = np.stack(np.meshgrid(level, level, level), axis=-1).reshape(1, -1, 3)
-    lab = cv2.cvtColor(rgb, cv2.COLOR_RGB2Lab)[0].astype(int)
-    inside = _gate(color, hue_tolerance, chroma)[256 * lab[:, 1] + lab[:, 2]]
-    hsv = cv2.cvtColor(rgb, cv2.COLOR_RGB2HSV)[0][inside > 0].astype(int)
-    pixel = np.rint(255 * np.array([[color]])).astype(np.uint8)
-    middle = int(cv2.cvtColor(pixel, cv2.COLOR_RGB2HSV)[0, 0, 0])
-    difference = (hsv[:, 0] - middle + 90) % 180 - 90
-    low = middle + difference.min() - 2
-    high = middle + difference.max() + 2
-    saturation = max(0, hsv[:, 1].min() - 6)
-    value = max(0, hsv[:, 2].min() - 6)
-    ranges = [(max(low, 0), min(high, 179))]
-    if low < 0:
-        ranges.append((low + 180, 179))
-    if high > 179:
-        ranges.append((0, high - 180))
-    return tuple(
-        (
-            np.array([a, saturation, value], dtype=float),
-            np.array([b, 255, 255], dtype=float),
-        )
-        for a, b in ranges
+def _require_image(image: Image) -> None:
+    """Raises InputError unless it is a color image of 8 bits."""
+    expected = "an array (h, w, 3 or 4) of uint8: red, green, blue (, alpha)"
+    require(isinstance(image, np.ndarray), "image", type(image), expected)
+    fits = image.ndim == 3 and image.shape[2] in (3, 4)
+    require(
+        fits and image.dtype == np.uint8,
+        "image",
+        f"an array {image.shape} of {image.dtype}",
+        expected,
     )
 
 
@@ -259,10 +246,14 @@ def find_candidates(
     """The rectangle (left, top, right, bottom) worth a closer look.
 
     All pixels that `segment` could mark lie in it; None if there are none.
+
+    Raises:
+        InputError: If `image` is no color image of 8 bits.
     """
+    _require_image(image)
     hsv = cv2.cvtColor(image, cv2.COLOR_RGB2HSV)
     mask: Image | None = None
-    for low, high in _coarse_gate(
+    for low, high in coarse_gate(
         tuple(config.color), config.hue_tolerance, config.chroma
     ):
         part = cv2.inRange(hsv, low, high)
@@ -282,7 +273,7 @@ def find_candidates(
 
 def segment(lab: Image, config: BlobConfig) -> Image:
     """Mask (h, w) of uint8: 255 where a pixel has the marker's hue."""
-    table = _gate(tuple(config.color), config.hue_tolerance, config.chroma)
+    table = gate(tuple(config.color), config.hue_tolerance, config.chroma)
     index = lab[:, :, 1].astype(np.uint16)
     index <<= 8
     index |= lab[:, :, 2]
@@ -341,7 +332,11 @@ def detect(image: Image, config: BlobConfig) -> Blob | None:
 
     What passes the gates of hue, chroma, area and shape with the highest
     confidence · √area is the marker.
+
+    Raises:
+        InputError: If `image` is no such image.
     """
+    _require_image(image)
     height, width = image.shape[:2]
     region = config.region
     x0, x1 = round(region[0] * width), round(region[2] * width)
@@ -363,11 +358,31 @@ def detect(image: Image, config: BlobConfig) -> Blob | None:
         else _moment_blobs(lab, mask, config, width * height)
     )
     best = max(
-        blobs, key=lambda b: b.confidence * math.sqrt(b.area), default=None
+        (b for b in blobs if b.confidence >= config.min_confidence),
+        key=lambda b: b.confidence * math.sqrt(b.area),
+        default=None,
     )
     if best is None:
         return None
     return dataclasses.replace(best, u=best.u + x0, v=best.v + y0)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Part:
+    """A connected part of the marker's hue.
+
+    Attributes:
+        moments: Area, centroid and central moments, see `_refine`.
+        rim: Its outer rim (n, 2) [pixels], in order.
+    """
+
+    moments: tuple[float, float, float, float, float, float]
+    rim: Array
+
+    @property
+    def area(self) -> float:
+        """[pixels²]."""
+        return self.moments[0]
 
 
 def _moment_blobs(
@@ -377,122 +392,162 @@ def _moment_blobs(
         return []
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
     areas = stats[:, cv2.CC_STAT_AREA]
-    largest = [
-        i
-        for i in (np.argsort(-areas[1:]) + 1)[:8]
-        if 0.5 * config.min_area <= areas[i] <= config.max_area * image_area
-    ]
-    blobs = []
-    for i in largest:
+    parts = []
+    for i in (np.argsort(-areas[1:]) + 1)[:_MOST_PARTS]:
+        if (
+            not 0.5 * config.min_area
+            <= areas[i]
+            <= (config.max_area * image_area)
+        ):
+            continue
         x, y, w, h = (int(value) for value in stats[i, :4])
-        moments = _refine(lab, labels, int(i), (x, y, w, h))
-        blob = _judge(moments, config)
+        inside = (labels[y : y + h, x : x + w] == i).astype(np.uint8)
+        parts.append(
+            _Part(
+                _refine(lab, labels, int(i), (x, y, w, h)),
+                find_rim(inside, (x, y)),
+            )
+        )
+    blobs = []
+    if config.complete:
+        joined, parts = _join(parts, config)
+        blobs += joined
+    for part in parts:
+        blob = _judge(part.moments, config)
         if blob is None:
             continue
-        if config.complete and blob.area >= _LEAST_TO_COMPLETE:
-            part = (labels[y : y + h, x : x + w] == i).astype(np.uint8)
-            blob = _complete(blob, moments, part, (x, y), config)
+        if config.complete:
+            blob = _complete(blob, part, parts, config)
         blobs.append(blob)
     return blobs
 
 
+def _join(
+    parts: Sequence[_Part], config: BlobConfig
+) -> tuple[list[Blob], list[_Part]]:
+    """Puts parts together that are of one ellipse, as an arm may lie across it.
+
+    Returns:
+        The blobs that are put together, and the parts that are not.
+    """
+    if len(parts) < 2:
+        return [], list(parts)
+    best: tuple[float, Blob, tuple[_Part, ...]] | None = None
+    for count in (2, 3, 4):
+        for group in itertools.combinations(parts[:_MOST_JOINED], count):
+            found = _join_group(group, config)
+            if found is not None and (best is None or found[0] > best[0]):
+                best = (*found, group)
+    if best is None:
+        return [], list(parts)
+    rest = [part for part in parts if part not in best[2]]
+    more, rest = _join(rest, config)
+    return [best[1], *more], rest
+
+
+def _join_group(
+    group: Sequence[_Part], config: BlobConfig
+) -> tuple[float, Blob] | None:
+    """The blob of parts that are of one ellipse, and how well they fit it."""
+    found = fit_outline([part.rim for part in group])
+    if found is None:
+        return None
+    ellipse, outer = found
+    area = sum(part.area for part in group)
+    # The fit is to pixels half a pixel within the edge.
+    axes = ellipse.axes + 0.5
+    seen = area / (math.pi * float(axes[0] * axes[1]))
+    aspect = float(axes[0] / axes[1])
+    rim = np.concatenate([part.rim for part in group])
+    covered = ellipse.covered(outer)
+    if (
+        area < config.min_area
+        or aspect > config.max_aspect
+        or not _LEAST_SEEN <= seen < 1.1
+        or covered < _LEAST_COVERED
+        or _beyond(ellipse, rim) > max(_BEYOND, _ROUGHER * math.sqrt(area))
+    ):
+        return None
+    for part in group:
+        # Each has a share in the rim, or it is something else inside.
+        own = np.abs(ellipse.distance(part.rim)) < 1.5 * ON_RIM
+        if own.mean() < 0.2:
+            return None
+    size = min(1.0, area / (2.0 * config.min_area))
+    u, v = ellipse.center
+    confidence = size * min(1.0, seen) * min(1.0, covered + 0.1)
+    return seen * covered, Blob(float(u), float(v), area, confidence)
+
+
 def _complete(
-    blob: Blob,
-    moments: tuple[float, float, float, float, float, float],
-    part: Image,
-    corner: tuple[int, int],
-    config: BlobConfig,
+    blob: Blob, part: _Part, parts: Sequence[_Part], config: BlobConfig
 ) -> Blob:
     """The middle of the whole ellipse where a part of it is hidden.
 
-    An ellipse that fits most of the rim is looked for from arcs of it, as
-    what hides the marker cuts its rim on one side.
+    A part that is no ellipse, and that none is found around, is hardly
+    believed: its middle is not that of the whole.
     """
-    contours, _ = cv2.findContours(
-        np.pad(part, 1), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
-    )
-    rim = max(contours, key=len)[:, 0].astype(np.float64)
-    rim += np.array(corner) - 1.0
-    n = len(rim)
-    if n < 16:
-        return blob
-    area, u, v, xx, xy, yy = moments
-    covariance = np.array([[xx, xy], [xy, yy]])
+    area, u, v, xx, xy, yy = part.moments
+    doubtful = dataclasses.replace(blob, confidence=_DOUBT * blob.confidence)
+    if area < _LEAST_TO_COMPLETE or len(part.rim) < 16:
+        # Too small to tell: unless more of it may be beside it.
+        return doubtful if _has_company(part, parts) else blob
     # A filled ellipse's axes are twice its standard deviations; the rim's
     # pixels lie, in the mean, half a pixel within.
-    inverse = np.linalg.inv(4.0 * covariance)
-    offset = rim - [u, v]
-    if _off_rim(offset, inverse) <= max(_ROUGH, 0.04 * math.sqrt(area)):
-        return blob
-    best: tuple[float, Image, Image] | None = None
-    for length in (0.45, 0.6, 0.75):
-        for start in range(0, n, max(1, n // 12)):
-            arc = np.take(
-                rim, np.arange(start, start + round(length * n)), 0, mode="wrap"
-            )
-            fit = _fit_ellipse(arc)
-            if fit is None:
-                continue
-            near = np.abs(_distance(rim - fit[0], fit[1])) < _ON_RIM
-            score = float(near.mean())
-            if best is None or score > best[0]:
-                best = score, rim[near], fit[0]
-    if best is None or best[0] < 0.5 or len(best[1]) < 8:
-        return blob
-    final = _fit_ellipse(best[1])
-    if final is None:
-        return blob
-    middle, shape = final
-    # The fit is to pixels half a pixel within the edge.
-    size = np.sqrt(1.0 / np.linalg.eigvalsh(shape)) + 0.5
-    whole = math.pi * float(size[0] * size[1])
-    aspect = float(max(size) / min(size))
-    seen = area / whole
-    if not 0.45 < seen < 1.1 or aspect > config.max_aspect:
-        return blob
-    shift = float(np.linalg.norm(middle - [u, v]))
-    if shift > max(size):
-        return blob
+    own = Ellipse(
+        np.array([u, v]),
+        np.linalg.inv(4.0 * np.array([[xx, xy], [xy, yy]])),
+    )
+    distance = own.distance(part.rim)
+    off = np.quantile(np.abs(distance - np.median(distance)), 0.95)
+    if off <= max(_ROUGH, _ROUGHER * math.sqrt(area)):
+        clean = off <= _CLEAN or area > _SMALL or not _has_company(part, parts)
+        return blob if clean else doubtful
+    # A bite out of it, or a slot in it.
+    slotted = _join_group((part,), config)
+    if slotted is not None:
+        doubtful = slotted[1]
+    found = fit_arcs(part.rim)
+    if found is None:
+        return doubtful
+    ellipse, _ = found
+    size = ellipse.axes + 0.5
+    seen = area / (math.pi * float(size[0] * size[1]))
+    aspect = float(size[0] / size[1])
+    shift = float(np.linalg.norm(ellipse.center - [u, v]))
+    if (
+        not _LEAST_SEEN < seen < 1.1
+        or aspect > config.max_aspect
+        or shift > float(size[0])
+        or _beyond(ellipse, part.rim) > max(_BEYOND, _ROUGHER * math.sqrt(area))
+    ):
+        return doubtful
     return Blob(
-        float(middle[0]),
-        float(middle[1]),
+        float(ellipse.center[0]),
+        float(ellipse.center[1]),
         area,
         blob.confidence * min(1.0, seen),
     )
 
 
-def _distance(offset: Array, shape: Array) -> Array:
-    """Signed distance (n,) [pixels], about, of points (n, 2) off an ellipse.
+def _beyond(ellipse: Ellipse, rim: Array) -> float:
+    """How far a rim is outside of an ellipse, at most of it [pixels].
 
-    The ellipse is xᵀ·shape·x = 1 about the origin.
+    What hides the marker takes away, and adds nothing.
     """
-    r = np.sqrt(
-        np.maximum(np.einsum("ni,ij,nj->n", offset, shape, offset), 1e-12)
-    )
-    return np.linalg.norm(offset, axis=1) * (1.0 - 1.0 / r)
+    return float(np.quantile(ellipse.distance(rim), 0.97))
 
 
-def _off_rim(offset: Array, shape: Array) -> float:
-    """How far the rim is off the ellipse, at most of its pixels [pixels]."""
-    distance = _distance(offset, shape)
-    return float(np.quantile(np.abs(distance - np.median(distance)), 0.95))
-
-
-def _fit_ellipse(points: Array) -> tuple[Array, Array] | None:
-    """Center (2,) and shape (2, 2) of the ellipse nearest to points (n, 2)."""
-    if len(points) < 6:
-        return None
-    origin = points.mean(axis=0)
-    found = cv2.fitEllipseDirect((points - origin).astype(np.float32))
-    (u, v), (width, height), angle = found
-    if not (math.isfinite(u) and min(width, height) > 2.0):
-        return None
-    if max(width, height) > 1e3:
-        return None
-    c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-    turn = np.array([[c, -s], [s, c]])
-    scale = np.diag([4.0 / width**2, 4.0 / height**2])
-    return origin + [u, v], turn @ scale @ turn.T
+def _has_company(part: _Part, parts: Sequence[_Part]) -> bool:
+    """Whether another part, not much smaller, is as near as it is long."""
+    reach = float(np.ptp(part.rim, axis=0).max()) + 1.0
+    for other in parts:
+        if other is part or other.area < 0.1 * part.area:
+            continue
+        apart = np.linalg.norm(part.rim[:, None] - other.rim, axis=-1)
+        if float(apart.min()) < reach:
+            return True
+    return False
 
 
 def _judge(

@@ -96,7 +96,7 @@ class BlobReporter(LeafSystem):
         blob = self._find(context)
         cache.set_value(
             np.zeros(4)
-            if blob is None
+            if blob is None or blob.confidence < self._config.min_confidence
             else np.array(dataclasses.astuple(blob), dtype=float)
         )
 

@@ -113,6 +113,12 @@ class CameraConfig:
         require_vector(f"{where}.translation", self.translation, 3, -1, 1)
         require_vector(f"{where}.rotation", self.rotation, 3, -4, 4)
         check_ranges(self, where)
+        require(
+            self.near < self.far,
+            f"{where}.near",
+            self.near,
+            f"less than {where}.far, {self.far:g}",
+        )
         if self.lens is not None:
             corner = np.array([-0.5, -0.5])
             model = self.model()

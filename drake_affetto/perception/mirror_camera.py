@@ -55,6 +55,7 @@ from drake_affetto.perception.imaging import (
     apply_effects,
     composite_mirror,
 )
+from drake_affetto.scene.parts import find_frame
 
 DIRECT = "direct"
 MIRROR = "mirror"
@@ -94,21 +95,6 @@ def make_renderer(config: RenderConfig) -> RenderEngine:
         for light in config.lights
     ]
     return MakeRenderEngineVtk(params)
-
-
-def find_frame(plant: MultibodyPlant, name: str) -> Frame:
-    """The frame `model::frame` (or `frame`, if there is but one) of a plant.
-
-    Raises:
-        InputError: if there is no such frame.
-    """
-    model, _, frame = name.rpartition("::")
-    try:
-        if not model:
-            return plant.GetFrameByName(frame)
-        return plant.GetFrameByName(frame, plant.GetModelInstanceByName(model))
-    except (RuntimeError, ValueError) as error:
-        raise InputError(f"the scene has no frame {name!r}") from error
 
 
 @dataclasses.dataclass(frozen=True)
@@ -200,15 +186,16 @@ class MirrorCamera(LeafSystem):
             self._remap = self._model.remap_grid()
         self._noise_bank = NoiseBank()
 
-        camera_frame = find_frame(plant, config.frame)
+        camera_frame = find_frame(plant, config.frame, "camera.frame")
         self._camera_id = _frame_id(plant, camera_frame)
         X_BC = camera_frame.GetFixedPoseInBodyFrame() @ RigidTransform(
             config.X_FC()
         )
         self.DeclareAbstractParameter(Value(X_BC))
         self._mirror_ids: list[FrameId] = []
-        for mirror in mirrors:
-            frame = find_frame(plant, mirror.frame)
+        for index, mirror in enumerate(mirrors):
+            field = f"mirrors[{index}].frame"
+            frame = find_frame(plant, mirror.frame, field)
             self._mirror_ids.append(_frame_id(plant, frame))
             self.DeclareAbstractParameter(
                 Value(frame.GetFixedPoseInBodyFrame())

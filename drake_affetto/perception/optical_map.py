@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from drake_affetto.common.errors import require_array
+from drake_affetto.common.fields import check_ranges, number
 from drake_affetto.common.typing import Array
 from drake_affetto.geometry import optics
 from drake_affetto.perception.blob import BlobCalibration
@@ -21,6 +23,30 @@ from drake_affetto.perception.camera_model import CameraModel, turn_points
 # strays meets a level far away rather than nowhere.
 _LEAST_FALL = 0.03
 _LEVEL_UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclasses.dataclass
+class PlaneExpectation:
+    """Where a mirror may stand, before it has been looked into.
+
+    Attributes:
+        foot: a place [x, y, z], in the world, m, by which its plane passes.
+        foot_sd: standard deviation of the plane's distance from it, m.
+        lean: elevation of the mirror's normal, rad; 0 stands upright.
+        lean_sd: standard deviation of it, rad.
+    """
+
+    foot: list[float] = dataclasses.field(
+        default_factory=lambda: [0.35, 0.3, 0.0]
+    )
+    foot_sd: float = number(0.1, 1e-4, 100.0)
+    lean: float = number(0.0, -1.5, 1.5)
+    lean_sd: float = number(0.2, 1e-4, 10.0)
+
+    def check(self, where: str) -> None:
+        """Raises InputError naming the first field that does not fit."""
+        check_ranges(self, where)
+        require_array(f"{where}.foot", self.foot, (3,))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,6 +65,7 @@ class OpticalMap:
         source: the sight in which the skill was learned; its camera must be
             without distortion, its marker in the middle of the image.
         source_calibration: of y_img there.
+        plane: where the mirror may stand; None if nothing is known of it.
     """
 
     target: CameraModel
@@ -46,6 +73,7 @@ class OpticalMap:
     yaw: float
     source: CameraModel
     source_calibration: BlobCalibration
+    plane: PlaneExpectation | None = None
 
     def count(self, n_in: int, n_out: int) -> int:
         """Number of parameters, 3.
@@ -126,6 +154,41 @@ class OpticalMap:
             return [("across", level)]
         chosen = np.linspace(0, len(named) - 1, min(n_starts, len(named)))
         return [named[round(i)] for i in chosen]
+
+    def unexpected(self, parameters: Array) -> tuple[Array, Array] | None:
+        """How far planes are from where a mirror is expected.
+
+        Args:
+            parameters: (S, 3).
+
+        Returns:
+            Residuals (S, 2) by foot and lean, in standard deviations, and
+            their derivatives (S, 2, 3); None if nothing is known.
+        """
+        if self.plane is None:
+            return None
+        azimuth, elevation, s = np.asarray(parameters, dtype=float).T
+        way = self.plane.foot - self.target.camera_pose(self.yaw)[:3, 3]
+        ca, sa = np.cos(azimuth), np.sin(azimuth)
+        ce, se = np.cos(elevation), np.sin(elevation)
+        level = ca * way[0] + sa * way[1]
+        across = ca * way[1] - sa * way[0]
+        zero, one = np.zeros_like(s), np.ones_like(s)
+        residual = np.stack(
+            [
+                (ce * level + se * way[2] + s) / self.plane.foot_sd,
+                (elevation - self.plane.lean) / self.plane.lean_sd,
+            ],
+            axis=-1,
+        )
+        slope = np.stack([ce * across, ce * way[2] - se * level, one], axis=-1)
+        return residual, np.stack(
+            [
+                slope / self.plane.foot_sd,
+                np.stack([zero, one, zero], axis=-1) / self.plane.lean_sd,
+            ],
+            axis=1,
+        )
 
     def _rays(self, X: Array) -> tuple[Array, Array]:
         """The eye (3,) and unit vectors (N, 3) to what is seen at X, in W."""

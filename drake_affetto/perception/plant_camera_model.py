@@ -10,7 +10,7 @@ from pydrake.systems.framework import Context
 from drake_affetto.perception.blob import BlobCalibration, calibrate
 from drake_affetto.perception.camera_model import CameraModel, Mirror
 from drake_affetto.perception.config import CameraConfig
-from drake_affetto.perception.mirror_camera import MirrorCamera, find_frame
+from drake_affetto.perception.mirror_camera import MirrorCamera
 from drake_affetto.scene import world
 
 
@@ -29,11 +29,10 @@ def make_camera_model(
         config: the camera.
         yaw_joint: the joint by which the camera turns.
     """
-    frame = find_frame(plant, config.frame)
     query: Any = plant.get_geometry_query_input_port().Eval(context)
     return CameraModel.from_chain(
         config.model(),
-        world.serial_chain(plant, frame.name()),
+        world.serial_chain(plant, config.frame),
         yaw_joint,
         world.get_posture(plant, context),
         float(world.marker_position(plant, context)[2]),

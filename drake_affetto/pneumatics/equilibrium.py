@@ -6,6 +6,7 @@ All arrays of parameters are (ROWS, n), their rows as in `chamber.Row`.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from drake_affetto.common.errors import require, require_array
 from drake_affetto.pneumatics.chamber import Row
 from drake_affetto.pneumatics.parameters import resting_pressure
 
@@ -40,13 +41,17 @@ def pressures_for_torque(
 
     Returns:
         p_a and p_b (n each), Pa absolute, within atmosphere and supply.
+
+    Raises:
+        InputError: For a torque or pressure of another shape, or not finite.
     """
     if mean is None:
         mean = resting_pressure(parameters)
-    wanted = np.asarray(torque, dtype=float)
+    wanted = _of_joints("torque", torque, parameters)
+    mean = _of_joints("mean", mean, parameters)
     K_a, K_b = parameters[Row.K_A], parameters[Row.K_B]
     low, high = parameters[Row.ATMOSPHERE], parameters[Row.SUPPLY]
-    gauge = np.asarray(mean, dtype=float) - low
+    gauge = mean - low
     shift = (wanted - (K_a - K_b) * gauge) / (K_a + K_b)
     # Where one chamber meets a limit the other makes up for it.
     p_a = np.clip(mean + shift, low, high)
@@ -68,8 +73,11 @@ def opening_for_torque(
     Args:
         parameters: of n joints, their valves underlapped.
         torque: (n) N m.
+
+    Raises:
+        InputError: For a torque of another shape, or not finite.
     """
-    wanted = np.asarray(torque, dtype=float)
+    wanted = _of_joints("torque", torque, parameters)
     low = np.full(wanted.shape, -1.0)
     high = -low
     # The torque only grows with the opening.
@@ -85,3 +93,18 @@ def opening_for_torque(
         low = np.where(below, middle, low)
         high = np.where(below, high, middle)
     return 0.5 * (low + high)
+
+
+def _of_joints(
+    field: str, value: ArrayLike, parameters: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """A finite number for each of the n joints (n); one number is for all."""
+    array = require_array(field, value)
+    n = parameters.shape[1]
+    require(
+        array.shape in ((), (1,), (n,)),
+        field,
+        f"an array of shape {array.shape}",
+        f"one number, or ({n},): one for each joint",
+    )
+    return np.broadcast_to(array, (n,))

@@ -19,7 +19,10 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drake_affetto.common.errors import require
+from drake_affetto.common.errors import (
+    require,
+    require_array,
+)
 
 GAS_CONSTANT = 287.05
 """Specific gas constant of dry air, J/(kg K)."""
@@ -92,9 +95,16 @@ def mass_flow_rate(
 
     Raises:
         InputError: for a negative pressure or conductance, b outside [0, 1),
-            or a temperature that is not positive.
+            a temperature that is not positive, or what is not finite.
     """
-    args = [np.asarray(a, dtype=float) for a in (p_up, p_down, C, b, T)]
+    args = [
+        require_array(name, value)
+        for name, value in zip(
+            ("p_up", "p_down", "C", "b", "T"),
+            (p_up, p_down, C, b, T),
+            strict=True,
+        )
+    ]
     checks = (
         ("p_up", lambda a: a >= 0.0, "an absolute pressure of at least 0 Pa"),
         ("p_down", lambda a: a >= 0.0, "an absolute pressure of at least 0 Pa"),

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from drake_affetto.common.errors import (
     InputError,
     require,
+    require_array,
     require_range,
 )
 from drake_affetto.common.fields import check_ranges, number
@@ -311,6 +312,9 @@ def parameter_array(
         array.shape,
         f"an array of shape ({ROWS}, n)",
     )
+    require(
+        not np.isnan(array).any(), "parameters", "an array with NaN", "numbers"
+    )
     return array
 
 
@@ -388,8 +392,20 @@ def pressure_differences(
 def chamber_volumes(
     parameters: NDArray[np.float64], q: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Volumes (n) of the chambers a and b [m³] at the joint angles q, rad."""
-    q = np.asarray(q, dtype=float)
+    """Volumes (n) of the chambers a and b [m³] at the joint angles q, rad.
+
+    Raises:
+        InputError: For angles that are not finite, or do not broadcast
+            against (n).
+    """
+    q = require_array("q", q)
+    n = parameters.shape[1]
+    require(
+        q.ndim == 0 or n == 1 or q.shape in ((1,), (n,)),
+        "q",
+        f"an array of shape {q.shape}",
+        f"one angle for each of {n} joints",
+    )
     volume_a = parameters[Row.V_A] + parameters[Row.K_A] * (
         q - parameters[Row.Q_LOWER]
     )
@@ -410,9 +426,12 @@ def closed_stiffness(
         parameters: (ROWS, n), see `chamber.Row`.
         q: joint angles (n), rad.
         pressure: (2n) [p_a; p_b], Pa absolute.
+
+    Raises:
+        InputError: For what is not finite, or of another shape.
     """
     n = parameters.shape[1]
-    p = np.asarray(pressure, dtype=float)
+    p = require_array("pressure", pressure, (2 * n,))
     volume_a, volume_b = chamber_volumes(parameters, q)
     return parameters[Row.EXPONENT] * (
         p[:n] * parameters[Row.K_A] ** 2 / volume_a

@@ -30,7 +30,9 @@ LIGHT = {
     "continue": "#8c2a6e",
     "transfer": "#3b94cf",
     "transfer_default": "#0b4f92",
+    "transfer_affine": "#6f6fd0",
     "gaussian_process": "#0a8f6a",
+    "affine_regression": "#4d5a1e",
     "other_scheme": "#7d6608",
     "hit": "#0b66a8",
     "miss": "#b85407",
@@ -56,7 +58,9 @@ DARK = {
     "continue": "#f59ac8",
     "transfer": "#3f8fd0",
     "transfer_default": "#a9d4ff",
+    "transfer_affine": "#8f8ff0",
     "gaussian_process": "#2fbf94",
+    "affine_regression": "#b4c46a",
     "other_scheme": "#cdb84a",
     "hit": "#62b1ee",
     "miss": "#f29a4b",
@@ -78,7 +82,9 @@ SYMBOLS = {
     "continue": "triangle-up",
     "transfer": "diamond",
     "transfer_default": "circle",
+    "transfer_affine": "circle-open-dot",
     "gaussian_process": "cross",
+    "affine_regression": "x",
 }
 
 _FONT = (

@@ -41,10 +41,20 @@ SCHEMES: dict[str, tuple[str, str, str]] = {
         "the same idea with several starts, whitened residuals and, where the "
         "scenario says so, a map that knows optics",
     ),
+    "transfer_affine": (
+        "transfer (ours, affine)",
+        "Transfer, ours with an affine map",
+        "our default, but nothing is known of camera, mirror or table",
+    ),
     "gaussian_process": (
         "Gaussian process",
         "Gaussian process",
         "what a practitioner would try first on so few demonstrations",
+    ),
+    "affine_regression": (
+        "linear regression",
+        "Linear regression",
+        "the movement as an affine function of what the new view shows",
     ),
 }
 
@@ -58,7 +68,7 @@ SCENARIOS = {
     "wide_angle": "wide-angle lens",
 }
 
-TRANSFERS = ("transfer", "transfer_default")
+TRANSFERS = ("transfer", "transfer_default", "transfer_affine")
 
 # What the paper found in the mirror: each first above each second.
 PAPER_ORDER = (
@@ -89,7 +99,9 @@ def in_text(name: str) -> str:
         "continue": "continued training",
         "transfer": "transfer in the paper's form",
         "transfer_default": "our default transfer",
+        "transfer_affine": "our transfer with an affine map",
         "gaussian_process": "the Gaussian process",
+        "affine_regression": "linear regression",
     }.get(name, name)
 
 

@@ -11,6 +11,12 @@ import numpy as np
 
 from drake_affetto.common.csv_columns import read_columns
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.log_limits import (
+    LogLimits,
+    load_limits,
+    require_between,
+    require_times,
+)
 from drake_affetto.common.typing import Array
 from drake_affetto.robot.controller import RobotController
 
@@ -72,6 +78,7 @@ def read_log(
     controller: RobotController,
     *,
     driven: bool = True,
+    limits: LogLimits | None = None,
 ) -> RobotLog:
     """Reads one joint from a CSV log of the robot.
 
@@ -83,9 +90,11 @@ def read_log(
         joint: Number of the joint.
         controller: The robot's controller, which has the scale of commands.
         driven: Whether to refuse a log in which the joint was not driven.
+        limits: What can be in a log; those of `LIMITS_FILE` by default.
 
     Raises:
-        InputError: If the file is not such a log; it names file and fault.
+        InputError: If the file is not such a log, or holds what cannot be, in
+            units or in time; it names file, column and row.
     """
     path = Path(path)
     data = read_columns(
@@ -96,21 +105,22 @@ def read_log(
         ],
         [f"{name}{joint}" for name in ("qdes", "dqdes", "q", "dq")],
     )
-    for name, column in data.items():
-        bad = np.flatnonzero(~np.isfinite(column))
-        if bad.size:
-            raise InputError(
-                f"{path}: column {name} is {column[bad[0]]} in row "
-                f"{bad[0] + 1} (t = {data['t'][bad[0]]:g} s)"
-            )
+    limits = limits or load_limits()
     t = data["t"]
-    back = np.flatnonzero(np.diff(t) <= 0.0)
-    if back.size:
-        i = int(back[0])
-        raise InputError(
-            f"{path}: time does not increase from row {i + 1} "
-            f"(t = {t[i]:g} s) to the next ({t[i + 1]:g} s)"
-        )
+    require_times(path, t, limits)
+    for name, (low, high), unit in (
+        (f"rq{joint}", limits.angle, "% of the joint's range"),
+        (f"qdes{joint}", limits.angle, "% of the joint's range"),
+        (f"q{joint}", limits.angle, "% of the joint's range"),
+        (f"rpa{joint}", limits.pressure, "kPa gauge"),
+        (f"rpb{joint}", limits.pressure, "kPa gauge"),
+        (f"ca{joint}", limits.command, "as on the wire"),
+        (f"cb{joint}", limits.command, "as on the wire"),
+        (f"dqdes{joint}", (-np.inf, np.inf), "%/s"),
+        (f"dq{joint}", (-np.inf, np.inf), "%/s"),
+    ):
+        if name in data:
+            require_between(path, name, data, low, high, unit)
     if t[-1] - t[0] < 2.0:
         raise InputError(
             f"{path}: {t[-1] - t[0]:.2f} s long, at least 2 s are needed"

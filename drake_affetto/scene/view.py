@@ -16,6 +16,7 @@ from pydrake.visualization import AddFrameTriadIllustration
 
 from drake_affetto.common.errors import require_range
 from drake_affetto.scene import world
+from drake_affetto.scene.parts import find_frame
 
 # Where robot, drum and mirror are in view, and what is in the middle, m.
 CAMERA_POSITION = (0.95, -0.75, 0.50)
@@ -23,7 +24,12 @@ CAMERA_TARGET = (0.16, 0.02, 0.10)
 
 _STOP = "Stop"
 _DRUM = ("drum x [m]", "drum y [m]")
-_FRAMES = ("eye_camera", "right_palm", "mirror", "head_center")
+_FRAMES = (
+    "affetto::eye_camera",
+    "affetto::right_palm",
+    "mirror::mirror",
+    "drum::head_center",
+)
 
 
 def set_default_camera_pose(meshcat: Meshcat) -> None:
@@ -66,7 +72,7 @@ def view_model(
     plant.Finalize()
     if frames:
         for name in _FRAMES:
-            frame = plant.GetFrameByName(name)
+            frame = find_frame(plant, name)
             AddFrameTriadIllustration(
                 scene_graph=scene_graph, frame=frame, length=0.06, radius=0.001
             )

@@ -20,7 +20,7 @@ from pydrake.geometry import (
     SceneGraphInspector,
     Sphere,
 )
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import (
     LoadModelDirectives,
     ModelDirectives,
@@ -30,6 +30,7 @@ from pydrake.multibody.parsing import (
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
+    Frame,
     ModelInstanceIndex,
     RevoluteJoint,
     RigidBody,
@@ -45,8 +46,10 @@ from drake_affetto.common.errors import (
 )
 from drake_affetto.common.fields import file_name
 from drake_affetto.common.resources import configure_parser, resolve
+from drake_affetto.common.strict_yaml import check_yaml
 from drake_affetto.geometry.kinematics import SerialChain
 from drake_affetto.scene import joints
+from drake_affetto.scene.parts import find_body, find_frame
 
 ACTIVE_JOINTS = (
     "waist_roll",
@@ -105,6 +108,7 @@ class WorldConfig:
             that are not named are at zero.
         frames: Frame of the directives -> its other pose, for instance of
             `affetto_base` or `mirror_pose`.
+        offsets: Frame of the directives -> what is added to its pose.
     """
 
     directives: str = file_name(
@@ -116,6 +120,7 @@ class WorldConfig:
     )
     default_posture: dict[str, float] = dataclasses.field(default_factory=dict)
     frames: dict[str, FramePose] = dataclasses.field(default_factory=dict)
+    offsets: dict[str, FramePose] = dataclasses.field(default_factory=dict)
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that does not fit."""
@@ -136,8 +141,9 @@ class WorldConfig:
             require_range(
                 f"{where}.default_posture.{name}", angle, -np.pi, np.pi
             )
-        for name, pose in self.frames.items():
-            pose.check(f"{where}.frames.{name}")
+        for field in ("frames", "offsets"):
+            for name, pose in getattr(self, field).items():
+                pose.check(f"{where}.{field}.{name}")
 
 
 def add_world(plant: MultibodyPlant, config: WorldConfig) -> None:
@@ -153,17 +159,17 @@ def add_world(plant: MultibodyPlant, config: WorldConfig) -> None:
     config.check("world")
     parser = Parser(plant)
     configure_parser(parser)
+    path = resolve(config.directives)
+    check_yaml(path)
     with _reading(config.directives):
-        directives = LoadModelDirectives(str(resolve(config.directives)))
+        directives = LoadModelDirectives(str(path))
         _move_frames(directives, config)
         ProcessModelDirectives(directives, parser)
     _require_scene(plant, config.directives)
     with _reading(config.drum):
-        drum = parser.AddModels(str(resolve(config.drum)))[0]
-    for name in ("head_center", "marker"):
-        if not plant.HasFrameNamed(name, drum):
-            raise InputError(f"{config.drum} has no frame {name}")
-    X_WT = plant.GetFrameByName("table_pose").GetFixedPoseInBodyFrame()
+        models = parser.AddModels(str(resolve(config.drum)))
+    root = _require_drum(plant, models, config.drum)
+    X_WT = find_frame(plant, "table_pose").GetFixedPoseInBodyFrame()
     placement = plant.AddFrame(
         FixedOffsetFrame(
             _PLACEMENT,
@@ -171,7 +177,6 @@ def add_world(plant: MultibodyPlant, config: WorldConfig) -> None:
             RigidTransform([*config.drum_position, X_WT.translation()[2]]),
         )
     )
-    root = plant.get_body(plant.GetBodyIndices(drum)[0])
     plant.WeldFrames(placement, root.body_frame())
     check_posture(plant, config.default_posture, "world.default_posture")
     for name, angle in config.default_posture.items():
@@ -179,21 +184,32 @@ def add_world(plant: MultibodyPlant, config: WorldConfig) -> None:
 
 
 def _move_frames(directives: ModelDirectives, config: WorldConfig) -> None:
-    """Puts the frames of `config.frames` elsewhere than the file has them."""
+    """Puts frames elsewhere than the file has them.
+
+    Those of `config.frames` first, then those of `config.offsets`, whose turns
+    are about the axes of the frame's base.
+    """
     added = {
         directive.add_frame.name: directive.add_frame
         for directive in directives.directives
         if directive.add_frame is not None
     }
-    for name, pose in config.frames.items():
-        if name not in added:
-            raise InputError(
-                f"world.frames: {config.directives} has no frame {name!r}, "
-                f"expected one of {', '.join(added)}"
-            )
-        X_PF = added[name].X_PF
-        X_PF.translation = np.array(pose.translation, dtype=float)
-        X_PF.rotation.set_rpy_deg(np.array(pose.rotation, dtype=float))
+    for field in ("frames", "offsets"):
+        for name, pose in getattr(config, field).items():
+            if name not in added:
+                raise InputError(
+                    f"world.{field}: {config.directives} has no frame "
+                    f"{name!r}, expected one of {', '.join(added)}"
+                )
+            X_PF = added[name].X_PF
+            translation = np.array(pose.translation, dtype=float)
+            turn = RollPitchYaw(np.deg2rad(pose.rotation)).ToRotationMatrix()
+            if field == "offsets":
+                before = X_PF.GetDeterministicValue()
+                translation = translation + before.translation()
+                turn = turn @ before.rotation()
+            X_PF.translation = translation
+            X_PF.rotation.set_rpy_deg(np.rad2deg(RollPitchYaw(turn).vector()))
 
 
 @contextlib.contextmanager
@@ -207,14 +223,57 @@ def _reading(uri: str) -> Iterator[None]:
 
 
 def _require_scene(plant: MultibodyPlant, uri: str) -> None:
-    for name, has in (
-        ("model affetto", plant.HasModelInstanceNamed("affetto")),
-        ("body table_top", plant.HasBodyNamed("table_top")),
-        ("frame table_pose", plant.HasFrameNamed("table_pose")),
-        ("frame mirror", plant.HasFrameNamed("mirror")),
-    ):
-        if not has:
-            raise InputError(f"{uri} has no {name}")
+    """Raises InputError unless the directives' models are as they must be."""
+    welded = plant.GetBodiesWeldedTo(plant.world_body())
+    for name in ("affetto::pelvis", "table::table_top", "mirror::mirror"):
+        if _required_frame(plant, name, uri).body() not in welded:
+            raise InputError(
+                f"{uri}: {name} is not welded to the world, as it must be"
+            )
+    for name in ("table_pose", "affetto::right_palm"):
+        _required_frame(plant, name, uri)
+
+
+def _required_frame(plant: MultibodyPlant, name: str, uri: str) -> Frame:
+    """The frame `name`; raises InputError naming the file without it."""
+    try:
+        return find_frame(plant, name)
+    except InputError:
+        raise InputError(f"{uri} has no frame {name!r}") from None
+
+
+def _require_drum(
+    plant: MultibodyPlant, models: Sequence[ModelInstanceIndex], uri: str
+) -> RigidBody:
+    """The root link of a drum that has what a drum needs.
+
+    Raises:
+        InputError: For a drum of another name, one that lacks a part, or one
+            that is fixed in the world already.
+    """
+    names = [plant.GetModelInstanceName(model) for model in models]
+    require(names == ["drum"], f"models in {uri}", names, "one, named drum")
+    for name in ("shell", "head"):
+        if not plant.HasBodyNamed(name, models[0]):
+            raise InputError(f"{uri} has no link {name!r}")
+    for name in ("head_center", "marker"):
+        _required_frame(plant, f"drum::{name}", uri)
+    bodies = [plant.get_body(i) for i in plant.GetBodyIndices(models[0])]
+    fixed = plant.GetBodiesWeldedTo(plant.world_body())
+    for body in bodies:
+        if body in fixed:
+            raise InputError(
+                f"{uri}: {body.scoped_name()} is static or welded to the "
+                "world, expected a drum that can be placed"
+            )
+    together = plant.GetBodiesWeldedTo(bodies[0])
+    for body in bodies:
+        if body not in together:
+            raise InputError(
+                f"{uri}: {body.scoped_name()} is not fixed to "
+                f"{bodies[0].scoped_name()}, expected a drum in one piece"
+            )
+    return bodies[0]
 
 
 def robot_instance(plant: MultibodyPlant) -> ModelInstanceIndex:
@@ -250,7 +309,12 @@ def joint_limits(
 def effort_limits(plant: MultibodyPlant, names: Sequence[str]) -> np.ndarray:
     """Effort limits [N m] of the actuators of the joints `names`, (n,)."""
     return np.array(
-        [plant.GetJointActuatorByName(n).effort_limit() for n in names]
+        [
+            plant.GetJointActuatorByName(
+                n, robot_instance(plant)
+            ).effort_limit()
+            for n in names
+        ]
     )
 
 
@@ -365,7 +429,7 @@ def table_extents(
     The plant must be connected to its SceneGraph. The table is level and
     square to the world.
     """
-    body = plant.GetBodyByName("table_top")
+    body = find_body(plant, "table::table_top")
     X_TG, box = _shapes(plant, context, body, Box)[0]
     X_WG = plant.EvalBodyPoseInWorld(context, body) @ X_TG
     half = 0.5 * np.abs(X_WG.rotation().matrix()) @ box.size()
@@ -374,21 +438,21 @@ def table_extents(
 
 def drum_radius(plant: MultibodyPlant, context: Context) -> float:
     """Radius [m] of the drum's shell, its widest part."""
-    body = plant.GetBodyByName("shell")
+    body = find_body(plant, "drum::shell")
     shapes = _shapes(plant, context, body, Cylinder)
     return max(shape.radius() for _, shape in shapes)
 
 
 def head_radius(plant: MultibodyPlant, context: Context) -> float:
     """Radius [m] of the drum's head, as far as it can be struck."""
-    body = plant.GetFrameByName("head_center").body()
+    body = find_frame(plant, "drum::head_center").body()
     shapes = _shapes(plant, context, body, Cylinder)
     return max(shape.radius() for _, shape in shapes)
 
 
 def hand_radius(plant: MultibodyPlant, context: Context) -> float:
     """Radius [m] of the soft right hand, about the palm's frame."""
-    body = plant.GetBodyByName("right_hand")
+    body = find_body(plant, "affetto::right_hand")
     shapes = _shapes(plant, context, body, Sphere)
     return max(shape.radius() for _, shape in shapes)
 
@@ -407,7 +471,7 @@ def find_marker_radius(
     Raises:
         InputError: If the drum has no visual cylinder named `marker`.
     """
-    body = plant.GetFrameByName("marker").body()
+    body = find_frame(plant, "drum::marker").body()
     frame = plant.GetBodyFrameIdOrThrow(body.index())
     for geometry in inspector.GetGeometries(frame, Role.kPerception):
         shape = inspector.GetShape(geometry)
@@ -419,7 +483,7 @@ def find_marker_radius(
 
 def mirror_size(plant: MultibodyPlant, context: Context) -> np.ndarray:
     """Extents [m] of the glass along the mirror's x and y, (2,)."""
-    body = plant.GetFrameByName("mirror").body()
+    body = find_frame(plant, "mirror::mirror").body()
     shapes = _shapes(plant, context, body, Box, Role.kPerception, "glass")
     return shapes[0][1].size()[:2]
 
@@ -450,26 +514,30 @@ def set_drum_position(
         f"x from {low[0]:.3f} to {high[0]:.3f} and y from {low[1]:.3f} to "
         f"{high[1]:.3f} m (the drum stands wholly on the table)",
     )
-    frame = plant.GetFrameByName(_PLACEMENT)
+    frame = plant.GetFrameByName(
+        _PLACEMENT, plant.world_body().model_instance()
+    )
     height = table_extents(plant, context)[1][2]
     frame.SetPoseInParentFrame(context, RigidTransform([*place, height]))
 
 
 def get_drum_position(plant: MultibodyPlant, context: Context) -> np.ndarray:
     """The drum's world x, y [m], (2,)."""
-    frame = plant.GetFrameByName(_PLACEMENT)
+    frame = plant.GetFrameByName(
+        _PLACEMENT, plant.world_body().model_instance()
+    )
     return frame.GetPoseInParentFrame(context).translation()[:2].copy()
 
 
 def marker_position(plant: MultibodyPlant, context: Context) -> np.ndarray:
     """World position [m] of the center of the drum's marker, (3,)."""
-    frame = plant.GetFrameByName("marker")
+    frame = find_frame(plant, "drum::marker")
     return frame.CalcPoseInWorld(context).translation()
 
 
 def head_center_position(plant: MultibodyPlant, context: Context) -> np.ndarray:
     """World position [m] of the top center of the drum's head, (3,)."""
-    frame = plant.GetFrameByName("head_center")
+    frame = find_frame(plant, "drum::head_center")
     return frame.CalcPoseInWorld(context).translation()
 
 
@@ -478,7 +546,7 @@ def serial_chain(plant: MultibodyPlant, frame_name: str) -> SerialChain:
 
     The plant must be finalized; welds are folded into the fixed poses.
     """
-    frame = plant.GetFrameByName(frame_name)
+    frame = find_frame(plant, frame_name)
     moved_by = {
         int(plant.get_joint(i).child_body().index()): plant.get_joint(i)
         for i in plant.GetJointIndices()

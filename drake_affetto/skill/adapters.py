@@ -11,6 +11,7 @@ predictions for each Jacobian.
 from collections.abc import Callable
 import dataclasses
 from typing import Any
+import warnings
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +30,9 @@ from drake_affetto.skill.mappings import Domain
 # Predictions (M, F) and their input Jacobian (M, F, d) at Z (M, d).
 Evaluate = Callable[[Array], tuple[Array, Array]]
 
+# Places at which it is asked whether derivatives are of use.
+_PROBES = 64
+
 
 @dataclasses.dataclass(eq=False)
 class SourceModel:
@@ -40,6 +44,7 @@ class SourceModel:
         n_out: F.
         exact: whether the Jacobian is in closed form.
         flat: whether the regressor predicts (M,) rather than (M, 1).
+        values: Z to ŷ alone, where the Jacobian is not in closed form.
     """
 
     evaluate: Evaluate
@@ -47,6 +52,7 @@ class SourceModel:
     n_out: int
     exact: bool = True
     flat: bool = False
+    values: Callable[[Array], Array] | None = None
 
     def project(self, matrix: Array) -> "SourceModel":
         """The model of ŷ · matrix, for a matrix (F, r)."""
@@ -57,7 +63,14 @@ class SourceModel:
                 np.swapaxes(jacobian, 1, 2) @ matrix, 1, 2
             )
 
-        return SourceModel(evaluate, self.n_in, matrix.shape[1], self.exact)
+        values = self.values
+        return SourceModel(
+            evaluate,
+            self.n_in,
+            matrix.shape[1],
+            self.exact,
+            values=None if values is None else lambda Z: values(Z) @ matrix,
+        )
 
     def output_basis(self) -> Array | None:
         """(F, r), orthonormal columns that span ŷ; None if not known."""
@@ -119,15 +132,80 @@ def source_model(estimator: Any) -> SourceModel:
         source.flat = estimator.coef_.ndim == 1
         return source
     n_in = int(estimator.n_features_in_)
-    sample = np.asarray(estimator.predict(np.zeros((1, n_in))))
+    sample = np.asarray(predict_unnamed(estimator, np.zeros((1, n_in))))
     evaluate = _evaluate_exactly(estimator, n_in, sample.size)
+    flat = sample.ndim == 1
+    if evaluate is not None:
+        return SourceModel(evaluate, n_in, sample.size, flat=flat)
+
+    def values(Z: Array) -> Array:
+        return _rows(predict_unnamed(estimator, Z))
+
     return SourceModel(
-        evaluate or _evaluate_numerically(estimator),
+        _evaluate_numerically(values),
         n_in,
         sample.size,
-        exact=evaluate is not None,
-        flat=sample.ndim == 1,
+        exact=False,
+        flat=flat,
+        values=values,
     )
+
+
+def predict_unnamed(estimator: Any, Z: Array, method: str = "predict") -> Any:
+    """Predictions at Z (M, d) of an estimator that may know its columns' names.
+
+    One that was fitted to named columns is given them by the same names: it
+    may choose among them, and would warn at each call.
+
+    Args:
+        estimator: Fitted estimator.
+        Z: Inputs (M, d), in the order of the columns it was fitted to.
+        method: Its method that is called.
+    """
+    call = getattr(estimator, method)
+    names = getattr(unwrap_frozen(estimator), "feature_names_in_", None)
+    if names is None:
+        return call(Z)
+    try:
+        import pandas as pd
+    except ImportError:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "X does not have valid feature")
+            return call(Z)
+    return call(pd.DataFrame(Z, columns=names))
+
+
+def without_derivatives(source: SourceModel) -> SourceModel:
+    """The model with a Jacobian of zeros, at one prediction each."""
+    values = source.values
+    assert values is not None
+
+    def evaluate(Z: Array) -> tuple[Array, Array]:
+        value = values(Z)
+        return value, np.zeros((*value.shape, Z.shape[1]))
+
+    return dataclasses.replace(source, evaluate=evaluate)
+
+
+def has_useful_derivatives(source: SourceModel, domain: Domain) -> bool:
+    """Whether a search may follow the model's derivatives.
+
+    Not those of a forest or of nearest neighbors, whose predictions are
+    constant but for jumps: their derivative is zero at most places.
+
+    Args:
+        source: The model.
+        domain: Where it is asked.
+    """
+    if source.exact:
+        return True
+    width = np.maximum(domain.high - domain.low, 1e-12)
+    random = np.random.default_rng(0)
+    Z = domain.low + width * random.random((_PROBES, source.n_in))
+    value, jacobian = source.evaluate(Z)
+    change = np.abs(jacobian * width).max(axis=(1, 2))
+    flat = change <= 1e-6 * max(float(np.ptp(value, axis=0).max()), 1e-300)
+    return bool(np.mean(flat) < 0.5)
 
 
 def _evaluate_exactly(estimator: Any, n_in: int, n_out: int) -> Evaluate | None:
@@ -148,7 +226,7 @@ def _evaluate_exactly(estimator: Any, n_in: int, n_out: int) -> Evaluate | None:
             linear = _evaluate_linear(coef, estimator.intercept_)
             # There are models with a link function behind the same names.
             Z = np.concatenate([np.zeros((1, n_in)), np.eye(n_in)])
-            if np.allclose(linear(Z)[0], _rows(estimator.predict(Z))):
+            if np.allclose(linear(Z)[0], _rows(predict_unnamed(estimator, Z))):
                 return linear
     return None
 
@@ -193,8 +271,9 @@ def _rows(values: Any) -> Array:
 
 def _evaluate_own(estimator: Any) -> Evaluate:
     def evaluate(Z: Array) -> tuple[Array, Array]:
-        value = np.asarray(estimator.predict(Z))
-        jacobian = np.asarray(estimator.input_jacobian(Z))
+        value = np.asarray(predict_unnamed(estimator, Z))
+        jacobian = predict_unnamed(estimator, Z, "input_jacobian")
+        jacobian = np.asarray(jacobian)
         return _rows(value), jacobian.reshape(len(Z), -1, Z.shape[1])
 
     return evaluate
@@ -208,14 +287,14 @@ def _evaluate_linear(coef: Array, intercept: Any) -> Evaluate:
     return evaluate
 
 
-def _evaluate_numerically(estimator: Any) -> Evaluate:
+def _evaluate_numerically(values: Callable[[Array], Array]) -> Evaluate:
     def evaluate(Z: Array) -> tuple[Array, Array]:
         n, d = Z.shape
         # A cube root of rounding balances it against the cubic error.
         step = 6e-6 * np.maximum(1.0, np.abs(Z).max(axis=0, initial=0.0))
         shifts = np.concatenate([np.diag(step), -np.diag(step)])
         moved = (Z + shifts[:, None, :]).reshape(-1, d)
-        value = _rows(estimator.predict(np.concatenate([Z, moved])))
+        value = values(np.concatenate([Z, moved]))
         both = value[n:].reshape(2, d, n, -1)
         slope = (both[0] - both[1]) / (2.0 * step)[:, None, None]
         return value[:n], np.moveaxis(slope, 0, 2)
@@ -349,7 +428,9 @@ def _evaluate_pipeline(estimator: Any) -> Evaluate | None:
     before = estimator[:-1]
     n_in = int(estimator.n_features_in_)
     corners = np.concatenate([np.zeros((1, n_in)), np.eye(n_in)])
-    moved = before.transform(corners)
+    moved = np.asarray(
+        predict_unnamed(before, corners, "transform"), dtype=float
+    )
     # Scalers are affine, and act on each input by itself.
     gain = np.diag(moved[1:] - moved[0])
 

@@ -13,6 +13,7 @@ rounding does not add up, however many there are. What that transformation
 leaves of a sample's outputs tells, beside, how well they could be predicted.
 """
 
+import copy
 from typing import Any, Self
 
 import numpy as np
@@ -33,6 +34,11 @@ _CHUNK = 1024
 _BLOCK = 16
 # With more outputs their covariance would not be worth its memory.
 _MOST_OUTPUTS = 2000
+
+
+# What the hidden layer and the memory have been made with; `forgetting` may
+# change from sample to sample.
+_FIXED = ("n_hidden", "alpha", "weight_scale", "input_range")
 
 
 class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
@@ -105,7 +111,8 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         far, in any order. It is solved for when next needed.
 
         Raises:
-            ValueError: if the data or a parameter do not fit.
+            ValueError: if the data or a parameter do not fit, or a parameter
+                other than `forgetting` is not what the learning began with.
         """
         first = not hasattr(self, "_root")
         X, y = self._validate(X, y, reset=first)
@@ -123,6 +130,7 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
                 f"y has shape {y.shape}, but the earlier samples make this "
                 f"{type(self).__name__} expect {expected}"
             )
+        self._check_unchanged()
         self._learn(X, y)
         return self
 
@@ -228,6 +236,10 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
             size=(n_features, self.n_hidden)
         )
         self.biases_ = scale * random.normal(size=self.n_hidden)
+        self._begun_with = {
+            name: copy.deepcopy(getattr(self, name)) for name in _FIXED
+        }
+        self._begun_with["random_state"] = self.random_state
         self._y_ndim = y.ndim
         n_outputs = 1 if y.ndim == 1 else y.shape[1]
         # R and z with RᵀR = ΦᵀΦ + α I and Rᵀz = ΦᵀY, by columns for LAPACK.
@@ -264,6 +276,21 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
                 raise ValueError(
                     f"{name} is {value!r}, expected a number above {low:g}"
                     + (f" and at most {high:g}" if high < np.inf else "")
+                )
+
+    def _check_unchanged(self) -> None:
+        """Raises ValueError for a parameter that would have no effect."""
+        self._check_parameters()
+        for name, then in self._begun_with.items():
+            now = getattr(self, name)
+            if now is then:
+                continue
+            if isinstance(now, np.random.RandomState) or not np.array_equal(
+                np.asarray(now), np.asarray(then)
+            ):
+                raise ValueError(
+                    f"{name} is {now!r}, but the learning has begun with "
+                    f"{then!r}; only `fit` begins anew"
                 )
 
     def _activate(self, X: Array) -> Array:

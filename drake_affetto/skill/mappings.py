@@ -21,6 +21,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from drake_affetto.common.errors import require, require_array
 from drake_affetto.common.typing import Array
 
 
@@ -42,8 +43,13 @@ class Domain:
 
     @classmethod
     def of_samples(cls, X: ArrayLike) -> Self:
-        """The domain of the samples X (N, d)."""
-        X = np.asarray(X, dtype=float)
+        """The domain of the samples X (N, d).
+
+        Raises:
+            InputError: For what is no such array of at least one sample.
+        """
+        X = require_array("X", X, (None, None))
+        require(len(X) > 0, "X", "no samples", "at least one")
         centered = X - X.mean(axis=0)
         return cls(
             X.mean(axis=0),
@@ -54,8 +60,13 @@ class Domain:
 
     @classmethod
     def of_range(cls, limits: ArrayLike) -> Self:
-        """The domain of inputs that fill the box limits (d, 2) evenly."""
-        low, high = np.asarray(limits, dtype=float).T
+        """The domain of inputs that fill the box limits (d, 2) evenly.
+
+        Raises:
+            InputError: For what is no such box.
+        """
+        low, high = require_array("limits", limits, (None, 2)).T
+        require(bool(np.all(low < high)), "limits", limits, "low below high")
         return cls(
             (low + high) / 2.0, np.diag((high - low) ** 2 / 12.0), low, high
         )
@@ -69,6 +80,18 @@ class Domain:
 
 class Mapping(abc.ABC):
     """h(x; p): a family of maps with parameters p (P,)."""
+
+    def expectation(self, parameters: Array) -> tuple[Array, Array] | None:
+        """What is known of the parameters before any sample, if anything.
+
+        Args:
+            parameters: (S, P).
+
+        Returns:
+            Residuals (S, R), each of unit standard deviation, and their
+            derivatives (S, R, P); or None.
+        """
+        return None
 
     @abc.abstractmethod
     def count(self, n_in: int, n_out: int) -> int:
@@ -301,3 +324,47 @@ def _turns(
     basis *= np.exp(0.3 * random.normal(size=(missing, 1, 1)))
     turns += [("random", turn[:n_out, :n_in]) for turn in basis]
     return turns[:count]
+
+
+# Samples that spread less than this across their longest extent are a line.
+_THIN = 0.03
+
+
+def lost_parameters(mapping: Mapping, parameters: Array, X: Array) -> int:
+    """How many parameters of a map samples leave open because of their place.
+
+    Samples on a line do not tell an affine map of a plane, however many.
+
+    Args:
+        mapping: The map.
+        parameters: Parameters (P,) at which it is linearized.
+        X: Samples (N, n).
+
+    Returns:
+        The number of parameters that samples all around would determine, but
+        these do not; those that differ hardly from a line count as on it.
+    """
+    unit = Domain.of_samples(X).deviation
+    mean = X.mean(axis=0)
+    left, size, right = np.linalg.svd((X - mean) / unit, full_matrices=False)
+    size = np.where(size > _THIN * size[0], size, 0.0)
+    flattened = mean + ((left * size) @ right) * unit
+    cloud = np.random.default_rng(0).standard_normal(
+        (2 * len(parameters), X.shape[1])
+    )
+    return max(
+        _rank(mapping.derivative(parameters, mean + cloud * unit))
+        - _rank(mapping.derivative(parameters, flattened)),
+        0,
+    )
+
+
+def _rank(derivative: Array) -> int:
+    """The rank of ∂h/∂p (N, d, P) over all samples."""
+    stacked = derivative.reshape(-1, derivative.shape[-1])
+    if not np.isfinite(stacked).all():
+        return 0
+    length = np.linalg.norm(stacked, axis=0)
+    return int(
+        np.linalg.matrix_rank(stacked / np.where(length > 0.0, length, 1.0))
+    )

@@ -1,5 +1,6 @@
 """The optical map as one of the maps that a transfer can learn."""
 
+from drake_affetto.common.typing import Array
 from drake_affetto.perception.optical_map import OpticalMap
 from drake_affetto.skill.mappings import Mapping
 
@@ -9,3 +10,7 @@ class OpticalMapping(OpticalMap, Mapping):
 
     See `OpticalMap` for what it is given.
     """
+
+    def expectation(self, parameters: Array) -> tuple[Array, Array] | None:
+        """Where a mirror may stand; see `PlaneExpectation`."""
+        return self.unexpected(parameters)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
+from drake_affetto.common.errors import require_array, require_range
 from drake_affetto.common.typing import Array
 from drake_affetto.skill.adapters import (
     SourceModel,
@@ -50,10 +51,9 @@ def loo_covariance(
     Raises:
         ValueError: if the data or the shrinkage do not fit.
     """
-    if not 0.0 <= shrinkage <= 1.0:
-        raise ValueError(
-            f"shrinkage is {shrinkage!r}, expected a number from 0 to 1"
-        )
+    require_range("shrinkage", shrinkage, 0.0, 1.0)
+    X = require_array("X", X, (None, None))
+    y = require_array("y", y)
     residuals = estimator.loo_residuals(X, y)
     residuals = residuals.reshape(len(residuals), -1)
     return _shrunk(residuals.T @ residuals / len(residuals), shrinkage)
@@ -97,7 +97,7 @@ def expected_errors(
 
 def whitening(metric: ArrayLike, n_out: int) -> Array:
     """L (F, F) such that errors e with that covariance have e L white."""
-    covariance = np.asarray(metric, dtype=float)
+    covariance = require_array("metric", metric)
     if covariance.shape == (n_out,):
         covariance = np.diag(covariance)
     if covariance.shape != (n_out, n_out):

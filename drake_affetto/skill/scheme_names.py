@@ -7,8 +7,14 @@ The names are keys of results.json and of configurations. They stand apart from
 # (i) to (iv) of the paper.
 PAPER_SCHEMES = ("unchanged", "relearn", "continue", "transfer")
 
-# (v) transfer with the library's defaults, (vi) a Gaussian process on the few
-# samples: what the studies on the robot compare.
-STUDY_SCHEMES = (*PAPER_SCHEMES, "transfer_default", "gaussian_process")
-
-SCHEMES = (*STUDY_SCHEMES, "affine_regression")
+# (v) transfer with the library's defaults and whatever map the scenario names,
+# (vi) the same with an affine map, which knows nothing of cameras and mirrors,
+# (vii) a Gaussian process and (viii) a linear regression on the few samples:
+# what the studies on the robot compare.
+SCHEMES = (
+    *PAPER_SCHEMES,
+    "transfer_default",
+    "transfer_affine",
+    "gaussian_process",
+    "affine_regression",
+)

@@ -131,6 +131,7 @@ _MAKERS: dict[str, Callable[..., Any]] = {
     "continue": FineTuned,
     "transfer": _paper,
     "transfer_default": TransferRegressor,
+    "transfer_affine": TransferRegressor,
     "gaussian_process": _gaussian_process,
     "affine_regression": lambda source: LinearRegression(),
 }
@@ -145,7 +146,9 @@ def make_scheme(
     - relearn: the same kind of regressor, from scratch.
     - continue: a copy of the skill, trained further.
     - transfer: Eq. 5 as in the paper: affine, BFGS from the identity.
-    - transfer_default: `TransferRegressor` with its defaults.
+    - transfer_default, transfer_affine: `TransferRegressor` with its defaults,
+      whose map is affine. A study gives the first whatever map its scenario
+      names.
     - gaussian_process, affine_regression: fitted to the new samples alone.
 
     Args:

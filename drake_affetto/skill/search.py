@@ -35,6 +35,8 @@ class Prior:
         moments: weight of each point in a comparison of mean and covariance.
         shape: weight of an affine map's distortion.
         scale: by which H is divided before its distortion is judged.
+        expected: weight of the squared residuals of what the map's family
+            expects of its parameters.
     """
 
     domain: Domain
@@ -42,6 +44,7 @@ class Prior:
     moments: float
     shape: float
     scale: float
+    expected: float = 0.0
 
 
 class Objective:
@@ -101,6 +104,7 @@ class Objective:
             for weight, term in (
                 (self._prior.moments, self._moments),
                 (self._prior.shape, self._distortion),
+                (self._prior.expected, self._unexpected),
             ):
                 if weight > 0.0:
                     residual, change = term(parameters, moved, slope)
@@ -163,6 +167,18 @@ class Objective:
             root * np.concatenate(residuals, axis=1),
             root * np.concatenate(changes, axis=1),
         )
+
+    def _unexpected(
+        self, parameters: Array, moved: Array, slope: Array
+    ) -> tuple[Array, Array]:
+        """How far parameters are from what their family expects.
+
+        Returns:
+            Residuals (S, R) and their derivatives (S, R, P).
+        """
+        known = self._mapping.expectation(parameters)
+        assert known is not None
+        return known
 
     def _distortion(
         self, parameters: Array, moved: Array, slope: Array
@@ -272,7 +288,8 @@ def _descend(
         cost[kept] = new_cost[better]
         gradient[kept] = new_gradient[better]
         curvature[kept] = new_curvature[better]
-        ratio = gain / np.maximum(expected, 1e-300)
+        # Of more than 2 only that it is large counts.
+        ratio = np.clip(gain / np.maximum(expected, 1e-300), -1e3, 1e3)
         shrink = np.maximum(1.0 / 9.0, 1.0 - (2.0 * ratio - 1.0) ** 3)
         damping[index] *= np.where(better, shrink, growth[index])
         damping[index] = np.maximum(damping[index], 1e-12)
@@ -281,6 +298,66 @@ def _descend(
     return LocalMinima(
         parameters, cost, gradient, curvature, converged, iterations
     )
+
+
+# Differential evolution: least members of a population, weight of a
+# difference, share of parameters that a trial takes over, and generations
+# without a better one after which it ends.
+_MEMBERS, _WEIGHT, _CROSSOVER, _PATIENCE = 24, 0.6, 0.9, 30
+# Its generations are cheap beside the iterations of the others.
+_GENERATIONS = 5
+
+
+def evolution(
+    objective: Evaluate,
+    starts: Array,
+    *,
+    max_iter: int,
+    tol: float,
+) -> LocalMinima:
+    """Minimizes by differential evolution, from the starts as a population.
+
+    It uses no derivatives and tries all members at once. Each start has a
+    place in the population, and ends as the best that took this place.
+
+    Source: Storn and Price 1997, current-to-best/1/bin.
+    """
+    random = np.random.default_rng(0)
+    count, size = starts.shape
+    extra = max(_MEMBERS - count, 0)
+    spread = np.maximum(starts.std(axis=0), 0.1 * np.abs(starts).max())
+    drawn = starts[random.integers(count, size=extra)]
+    drawn = drawn + spread * random.standard_normal((extra, size))
+    members = np.concatenate([starts, drawn]).astype(float)
+    n = len(members)
+    cost = objective(members)[0]
+    improved_at, generation, least = 0, 0, float(cost.min())
+    while generation < _GENERATIONS * max_iter:
+        if generation - improved_at >= _PATIENCE:
+            break
+        generation += 1
+        best = members[np.argmin(cost)]
+        one, other = random.integers(n, size=(2, n))
+        trial = members + _WEIGHT * (
+            (best - members) + members[one] - members[other]
+        )
+        kept = random.random((n, size)) > _CROSSOVER
+        kept[range(n), random.integers(size, size=n)] = False
+        trial = np.where(kept, members, trial)
+        new = objective(trial)[0]
+        better = new < cost
+        members[better], cost[better] = trial[better], new[better]
+        if cost.min() < least * (1.0 - tol) - 1e-300:
+            improved_at = generation
+            least = float(cost.min())
+    # What was drawn beside the starts may have found the best.
+    best = int(np.argmin(cost))
+    if best >= count:
+        worst = int(np.argmax(cost[:count]))
+        members[worst], cost[worst] = members[best], cost[best]
+    members = members[:count]
+    converged = np.full(count, generation < _GENERATIONS * max_iter)
+    return LocalMinima(members, *objective(members), converged, generation)
 
 
 def bfgs(
@@ -314,3 +391,17 @@ def bfgs(
     return LocalMinima(
         parameters, *objective(parameters), np.array(converged), iterations
     )
+
+
+def repetitions(moved: Array, cost: Array, domain: Domain) -> NDArray[np.bool_]:
+    """Which minima (S,) map the samples as a better one already does."""
+    z = moved / domain.deviation
+    repeated = np.zeros(len(z), dtype=bool)
+    kept: list[int] = []
+    for s in np.argsort(cost):
+        apart = np.abs(z[kept] - z[s]).max(axis=(1, 2))
+        if np.any(apart < 1e-2):
+            repeated[s] = True
+        else:
+            kept.append(s)
+    return repeated

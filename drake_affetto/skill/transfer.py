@@ -41,14 +41,18 @@ from sklearn.utils.validation import (
 from drake_affetto.common.typing import Array
 from drake_affetto.skill.adapters import (
     SourceModel,
+    has_useful_derivatives,
+    predict_unnamed,
     source_domain,
     source_model,
+    without_derivatives,
 )
 from drake_affetto.skill.mappings import (
     Affine,
     Domain,
     Mapping,
     Similarity,
+    lost_parameters,
     make_mapping,
 )
 from drake_affetto.skill.residuals import (
@@ -61,7 +65,9 @@ from drake_affetto.skill.search import (
     Objective,
     Prior,
     bfgs,
+    evolution,
     levenberg_marquardt,
+    repetitions,
 )
 
 # Weights of the prior's terms relative to the squared error that is expected
@@ -75,6 +81,11 @@ _MANY_MOMENTS = 0.3
 _PLAIN_ALPHA = 0.03
 
 
+_SOLVERS = {
+    "lm": levenberg_marquardt,
+    "bfgs": bfgs,
+    "evolution": evolution,
+}
 _PRIORS = ("auto", "domain", "similar", "moments")
 
 
@@ -121,7 +132,8 @@ class TransferRegressor(
             "moments": all that, and the x are tasks drawn like those of the
             skill, so h(x) has their mean and covariance; for many x. "auto":
             "moments" if there are unlabeled inputs, else "similar"; None if
-            it is not known where the skill was learned.
+            it is not known where the skill was learned. With any of them,
+            what the mapping itself expects of its parameters counts too.
         noise: the error to be expected of the skill itself, relative to the
             standard deviation of its outputs. It scales prior and average.
         metric: how residuals of several outputs are weighed. None: all alike.
@@ -135,8 +147,11 @@ class TransferRegressor(
             of each of its inputs, or a Domain. None to ask the estimator.
         residual: None; or a regressor, fitted to what the transferred skill
             still misses; "smooth" for a Gaussian process that bends slowly.
-        solver: "lm", Levenberg-Marquardt with all starts as one batch; or
-            "bfgs", one start after another.
+        solver: "lm", Levenberg-Marquardt with all starts as one batch;
+            "bfgs", one start after another; or "evolution", differential
+            evolution, which needs no derivatives. An estimator whose
+            predictions are constant but for jumps, such as a forest, always
+            gets the last.
         n_starts: from how many starts to search. The first is the identity.
         max_iter: iterations of each search at most.
         tol: relative change of the cost ("lm") or the gradient's greatest
@@ -145,6 +160,7 @@ class TransferRegressor(
 
     Attributes:
         estimator_: the source regressor.
+        solver_: the solver that was used.
         mapping_: the Mapping.
         parameters_: (P,), of the best minimum.
         H_, c_: (d, n_features), (d,): h(x) = H x + c, for affine maps and
@@ -200,7 +216,8 @@ class TransferRegressor(
         """Finds h from samples X (N, n_features) with known outputs y (N, F).
 
         Args:
-            X: (N, n_features), N at least 2.
+            X: (N, n_features). A single sample leaves most of a map to what
+                is expected of it.
             y: (N, F), or (N,) if the estimator predicts single numbers.
             X_unlabeled: (M, n_features), further inputs whose outputs are
                 not known, of tasks like those of the skill.
@@ -214,28 +231,32 @@ class TransferRegressor(
         X, targets, unlabeled = self._validate(X, y, X_unlabeled, source)
         mapping = make_mapping(self.mapping)
         n_in = X.shape[1]
-        mapping.count(n_in, source.n_in)
-        self._warn_of_freedom(mapping, source, len(X), n_in)
-
+        nothing = np.zeros((1, mapping.count(n_in, source.n_in)))
+        expects = mapping.expectation(nothing) is not None
         domain = self._source_domain(source)
         target = Domain.of_samples(np.concatenate([X, unlabeled]))
         reduced, wanted, rest, noise = self._whiten(source, targets, domain)
         kind = self._prior_kind(mapping, domain, n_in, source.n_in, unlabeled)
-        prior = _make_prior(kind, domain, target, noise)
+        prior = _make_prior(kind, domain, target, noise, expects)
         alpha = self.alpha
         if alpha is None:
             alpha = _PLAIN_ALPHA if prior is None else 0.0
-        objective = Objective(
-            reduced, mapping, X, wanted, unlabeled, float(alpha), prior
-        )
         # Where nothing is known of the skill's inputs, assume those of now.
         assumed = domain
         if assumed is None:
             assumed = _same_or_unit(target, source.n_in)
+        self.solver_ = self.solver
+        if not has_useful_derivatives(reduced, assumed):
+            self.solver_ = "evolution"
+        if self.solver_ == "evolution" and not reduced.exact:
+            reduced = without_derivatives(reduced)
+        objective = Objective(
+            reduced, mapping, X, wanted, unlabeled, float(alpha), prior
+        )
         random = check_random_state(self.random_state)
         named = mapping.starts(target, assumed, self.n_starts, random)
-        solve = levenberg_marquardt if self.solver == "lm" else bfgs
-        minima = solve(
+        self._warn_of_freedom(mapping, source, X, named[0][1])
+        minima = _SOLVERS[self.solver_](
             objective,
             np.array([parameters for _, parameters in named]),
             max_iter=self.max_iter,
@@ -243,7 +264,7 @@ class TransferRegressor(
         )
         self.estimator_ = self.estimator
         self.mapping_ = mapping
-        repeated = _repetitions(
+        repeated = repetitions(
             mapping.apply_many(minima.parameters, X), minima.cost, assumed
         )
         self._report(named, minima, repeated, rest, noise)
@@ -256,7 +277,7 @@ class TransferRegressor(
         X = np.asarray(validate_data(self, X, reset=False, dtype=np.float64))
         moved = self.mapping_.apply_many(self._averaged, X)
         flat = moved.reshape(-1, moved.shape[-1])
-        each = np.asarray(self.estimator_.predict(flat), dtype=float)
+        each = np.asarray(predict_unnamed(self.estimator_, flat), dtype=float)
         each = each.reshape(len(moved), len(X), *each.shape[1:])
         value = np.tensordot(self._weights, each, axes=1)
         if self.residual_ is not None:
@@ -274,9 +295,10 @@ class TransferRegressor(
             raise ValueError(
                 f"prior is {self.prior!r}, expected None or one of {_PRIORS}"
             )
-        if self.solver not in ("lm", "bfgs"):
+        if self.solver not in _SOLVERS:
             raise ValueError(
-                f"solver is {self.solver!r}, expected 'lm' or 'bfgs'"
+                f"solver is {self.solver!r}, expected one of "
+                f"{', '.join(map(repr, _SOLVERS))}"
             )
         for name in ("n_starts", "max_iter"):
             value = getattr(self, name)
@@ -309,7 +331,6 @@ class TransferRegressor(
             multi_output=True,
             y_numeric=True,
             dtype=np.float64,
-            ensure_min_samples=2,
         )
         checked = np.asarray(checked)
         targets = np.asarray(targets, dtype=np.float64)
@@ -321,7 +342,7 @@ class TransferRegressor(
                 f"y has {targets.shape[1]} outputs, but the estimator of this "
                 f"{type(self).__name__} predicts {source.n_out}"
             )
-        if np.all(checked == checked[0]):
+        if len(checked) > 1 and np.all(checked == checked[0]):
             raise ValueError(
                 "X is constant: all samples have the same input "
                 f"{checked[0].tolist()}, which no map can tell apart"
@@ -341,10 +362,22 @@ class TransferRegressor(
         return checked, targets, unlabeled
 
     def _warn_of_freedom(
-        self, mapping: Mapping, source: SourceModel, n: int, n_in: int
+        self, mapping: Mapping, source: SourceModel, X: Array, start: Array
     ) -> None:
+        """Warns of what the samples cannot determine of the map."""
+        n, n_in = X.shape
         freedom = mapping.freedom(n_in, source.n_in)
         known = n * min(source.n_out, source.n_in)
+        lost = lost_parameters(mapping, start, X)
+        if known >= freedom and lost:
+            # There may be enough samples, but all on a line.
+            warnings.warn(
+                f"the {n} samples lie on a line or plane among their "
+                f"{n_in} inputs and do not determine {lost} of the {freedom} "
+                "parameters of the map: off it, predictions are a guess",
+                UserWarning,
+                stacklevel=3,
+            )
         if known < freedom:
             warnings.warn(
                 f"{n} samples determine at most {known} of the {freedom} "
@@ -530,17 +563,21 @@ def _make_prior(
     domain: Domain | None,
     target: Domain,
     noise: float,
+    expects: bool,
 ) -> Prior | None:
     if not terms or domain is None:
         return None
     many = "moments" in terms
-    spread = np.trace(domain.covariance) / np.trace(target.covariance)
+    # A single sample has no spread.
+    seen = float(np.trace(target.covariance)) or 1.0
+    spread = np.trace(domain.covariance) / seen
     return Prior(
         domain=domain,
         inside=noise * (_MANY_INSIDE if many else _INSIDE),
         moments=noise * _MANY_MOMENTS if many else 0.0,
         shape=noise * _SHAPE if "shape" in terms else 0.0,
         scale=math.sqrt(spread) if spread > 0.0 else 1.0,
+        expected=noise if expects else 0.0,
     )
 
 
@@ -561,19 +598,3 @@ def _same_or_unit(target: Domain, n_out: int) -> Domain:
     if target.mean.size == n_out:
         return target
     return Domain.of_range(np.array([[-1.0, 1.0]] * n_out))
-
-
-def _repetitions(
-    moved: Array, cost: Array, domain: Domain
-) -> NDArray[np.bool_]:
-    """Which minima (S,) map the samples as a better one already does."""
-    z = moved / domain.deviation
-    repeated = np.zeros(len(z), dtype=bool)
-    kept: list[int] = []
-    for s in np.argsort(cost):
-        apart = np.abs(z[kept] - z[s]).max(axis=(1, 2))
-        if np.any(apart < 1e-2):
-            repeated[s] = True
-        else:
-            kept.append(s)
-    return repeated

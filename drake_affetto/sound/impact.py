@@ -10,7 +10,11 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
-from drake_affetto.common.errors import require
+from drake_affetto.common.errors import (
+    require,
+    require_array,
+    require_range,
+)
 from drake_affetto.common.typing import Array
 
 
@@ -51,10 +55,11 @@ def contact_force(
         Force on the surface, same shape as `target` [N].
 
     Raises:
-        InputError: for shapes that do not fit each other.
+        InputError: for shapes that do not fit each other, numbers that are
+            not finite, or times that are not evenly spaced.
     """
-    times = np.asarray(t, dtype=float)
-    path = np.asarray(target, dtype=float)
+    times = require_array("t", t, (None,))
+    path = require_array("target", target)
     require(
         path.ndim in (1, 2) and len(path) == len(times) >= 2,
         "target",
@@ -70,6 +75,12 @@ def contact_force(
         f"1 or {columns.shape[1]}",
     )
     step = float(times[-1] - times[0]) / (len(times) - 1)
+    require(
+        step > 0.0 and bool(np.allclose(np.diff(times), step, rtol=1e-3)),
+        "t",
+        f"times from {times[0]:g} to {times[-1]:g}",
+        "evenly spaced times, increasing",
+    )
     numbers = np.array([dataclasses.astuple(one) for one in hands])
     force = np.empty_like(columns)
     for i in range(columns.shape[1]):
@@ -119,8 +130,21 @@ def stroke(
         fall: duration of the way down, s.
         dwell: time at the bottom, s.
         rise: duration of the way up, s.
+
+    Raises:
+        InputError: for numbers that are not finite, or durations that are not
+            above 0.
     """
-    times = np.asarray(t, dtype=float) - start
+    for name, value, low in (
+        ("start", start, -1e6),
+        ("height", height, -1e3),
+        ("depth", depth, -1e3),
+        ("fall", fall, 1e-6),
+        ("dwell", dwell, 0.0),
+        ("rise", rise, 1e-6),
+    ):
+        require_range(name, value, low, 1e6)
+    times = require_array("t", t) - start
     down = np.clip(times / fall, 0.0, 1.0)
     up = np.clip((times - fall - dwell) / rise, 0.0, 1.0)
     share = 0.5 * (np.cos(np.pi * up) - np.cos(np.pi * down))

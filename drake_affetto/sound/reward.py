@@ -97,17 +97,19 @@ def spectrogram(
     Args:
         pressure: the recording (S), Pa.
         rate: its sampling rate, Hz.
+        config: bands and frames.
 
     Returns:
         (bands, frames), non-negative.
 
     Raises:
         InputError: if the recording is shorter than one window or not finite,
-            or the bands do not fit its rate.
+            the rate is none, or the bands do not fit it.
     """
     config = RewardConfig() if config is None else config
     config.check("reward")
-    sound = np.asarray(pressure, dtype=float)
+    require_range("rate", rate, 1.0, 1e7)
+    sound = require_array("pressure", pressure)
     size = round(config.window * rate)
     hop = max(1, round(config.hop * rate))
     require(
@@ -116,7 +118,6 @@ def spectrogram(
         f"an array of shape {sound.shape}",
         f"at least {size} samples, one window",
     )
-    require_array("pressure", sound)
     require_range("reward.high", config.high, high=0.5 * rate)
     # Nothing above the highest band matters: most samples can go first.
     spare = max(1, int(rate / (2.5 * config.high)))

@@ -35,11 +35,12 @@ def write_wav(
         The full scale that was used, Pa.
 
     Raises:
-        InputError: if the file cannot be written.
+        InputError: if the file cannot be written, or a value does not fit.
     """
     samples = require_array(
         "pressure", pressure, (None,), expected="one number a sample"
     )
+    require_range("rate", rate, 1.0, 1e7)
     require_range("full_scale", full_scale, 1e-9)
     peak = float(np.max(np.abs(samples), initial=0.0))
     while peak > full_scale:

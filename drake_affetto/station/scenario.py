@@ -5,33 +5,21 @@ import difflib
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike
 from pydrake.multibody.plant import MultibodyPlantConfig
 from pydrake.systems.analysis import SimulatorConfig
 
 from drake_affetto.common.errors import (
     InputError,
+    naming,
     require,
-    require_array,
     require_choice,
-    require_interval,
     require_range,
 )
 from drake_affetto.common.fields import file_name
 from drake_affetto.common.fingerprint import config_values
 from drake_affetto.common.resources import models_dir, resolve
-from drake_affetto.common.typing import Array, Mask
 from drake_affetto.common.yaml_config import anchored, read_yaml, typed
 from drake_affetto.control.pidf_controller import PidfConfig
-from drake_affetto.geometry.optics import (
-    polygon_area,
-    polygon_area_centroid,
-)
-from drake_affetto.geometry.region import (
-    crosses_itself,
-    inside_polygon,
-)
 from drake_affetto.motion.dmp_config import DmpConfig
 from drake_affetto.perception.blob import BlobConfig
 from drake_affetto.perception.config import (
@@ -40,19 +28,21 @@ from drake_affetto.perception.config import (
     RenderConfig,
 )
 from drake_affetto.perception.gaze import GazeConfig
+from drake_affetto.perception.knowledge import CalibrationError
+from drake_affetto.perception.optical_map import PlaneExpectation
 from drake_affetto.pneumatics.actuation import PneumaticActuationConfig
 from drake_affetto.scene.world import ACTIVE_JOINTS, WorldConfig
 from drake_affetto.skill.policy import SkillPolicyConfig
 from drake_affetto.sound.config import load_sound_config
+from drake_affetto.station.body import Body
+from drake_affetto.station.drake_config import (
+    check_plant_config,
+    check_simulator_config,
+)
+from drake_affetto.station.drum_region import DrumRegion
+from drake_affetto.station.model_check import check_models_once
 from drake_affetto.station.variation import VariationConfig
 from drake_affetto.teaching.stroke import TeacherConfig
-
-LONGEST_STEP = 5e-3
-"""The longest step of the plant, s. Up to it outcomes are those of a step of
-0.25 ms, within the limits of docs/step_convergence.md."""
-
-# The smallest region that a drum is put into, m².
-_LEAST_REGION = 1e-4
 
 # The fields that are Drake's own structs.
 _DRAKES: dict[str, Any] = {
@@ -62,57 +52,6 @@ _DRAKES: dict[str, Any] = {
 
 # A file names here the scenario whose values hold where it is silent.
 _EXTENDS = "extends"
-
-
-@dataclasses.dataclass
-class DrumRegion:
-    """Where trials put the drum's center: on the table, in the world frame.
-
-    Attributes:
-        x: lower and upper limit of a box, m.
-        y: lower and upper limit of a box, m.
-        polygon: corners [x, y] in order, m; where there are any, they are the
-            region and the box is not used.
-    """
-
-    x: list[float] = dataclasses.field(default_factory=lambda: [0.2, 0.27])
-    y: list[float] = dataclasses.field(default_factory=lambda: [-0.15, -0.03])
-    polygon: list[list[float]] = dataclasses.field(default_factory=list)
-
-    def check(self, where: str) -> None:
-        """Raises InputError for what is no interval or no polygon."""
-        for name in ("x", "y"):
-            require_interval(f"{where}.{name}", getattr(self, name))
-        if not self.polygon:
-            return
-        where = f"{where}.polygon"
-        for i, corner in enumerate(self.polygon):
-            require_array(f"{where}[{i}]", corner, (2,))
-        require(
-            len(self.polygon) >= 3
-            and bool(polygon_area(self.corners) > _LEAST_REGION)
-            and not crosses_itself(self.corners),
-            where,
-            self.polygon,
-            "three corners or more around at least 1 cm², in order",
-        )
-
-    @property
-    def corners(self) -> Array:
-        """(k, 2), in order, m."""
-        if self.polygon:
-            return np.array(self.polygon, dtype=float)
-        (x0, x1), (y0, y1) = self.x, self.y
-        return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
-
-    @property
-    def middle(self) -> Array:
-        """Center of its area (2,), m."""
-        return polygon_area_centroid(self.corners)[1]
-
-    def contains(self, xy: ArrayLike) -> Mask:
-        """Whether places (..., 2), m, are in the region or on its border."""
-        return inside_polygon(self.corners, xy)
 
 
 @dataclasses.dataclass
@@ -178,10 +117,19 @@ class TransferConfig:
             camera is known.
         residual: whether what the map leaves over is learned too, as a smooth
             departure.
+        plane: where the optical map expects a mirror.
+        errors: how wrongly it knows the camera; drawn once a repeat of a
+            study. Nobody measures a camera exactly.
     """
 
     mapping: str = "affine"
     residual: bool = False
+    plane: PlaneExpectation = dataclasses.field(
+        default_factory=PlaneExpectation
+    )
+    errors: CalibrationError = dataclasses.field(
+        default_factory=CalibrationError
+    )
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that does not fit."""
@@ -192,6 +140,8 @@ class TransferConfig:
             self.mapping,
             f"one of {', '.join(known)}",
         )
+        self.plane.check(f"{where}.plane")
+        self.errors.check(f"{where}.errors")
 
 
 @dataclasses.dataclass(eq=False)
@@ -226,6 +176,8 @@ class Scenario:
         dmp: see `motion`.
         control: see `control`.
         pneumatics: see `pneumatics`.
+        body: how this robot departs from its model, which its software takes
+            it to be; see `station.body`.
         variation: whether the robot varies from trial to trial as the real one
             does; see `variation`.
         sound: YAML file of the drum's voice and of the reward.
@@ -279,6 +231,7 @@ class Scenario:
     pneumatics: PneumaticActuationConfig = dataclasses.field(
         default_factory=PneumaticActuationConfig
     )
+    body: Body = dataclasses.field(default_factory=Body)
     variation: VariationConfig = dataclasses.field(
         default_factory=VariationConfig
     )
@@ -299,11 +252,9 @@ class Scenario:
         require_range(
             f"{where}.settling_duration", self.settling_duration, 0.1, 60
         )
-        require_range(
-            f"{where}.plant_config.time_step",
-            self.plant_config.time_step,
-            1e-5,
-            LONGEST_STEP,
+        check_plant_config(self.plant_config, f"{where}.plant_config")
+        check_simulator_config(
+            self.simulator_config, f"{where}.simulator_config"
         )
         require(
             len(set(self.active_joints)) == len(self.active_joints) > 0,
@@ -330,12 +281,11 @@ class Scenario:
             self.pneumatics.mode,
             "'flow' where the valves are controlled by PIDF (Eq. 7)",
         )
-        load_sound_config(self.sound)
-        if self.wire:
-            try:
+        with naming(f"{where}.sound"):
+            load_sound_config(self.sound)
+        if self.wire or self.hardware:
+            with naming(f"{where}.wire"):
                 resolve(self.wire)
-            except InputError as error:
-                raise InputError(f"{where}.wire: {error}") from None
         for i, mirror in enumerate(self.mirrors):
             mirror.check(f"{where}.mirrors[{i}]")
         for field in dataclasses.fields(self):
@@ -348,8 +298,27 @@ class Scenario:
             self.world.drum_position,
             f"a place in {where}.drum_region",
         )
+        self._check_transfer(where)
         # Last: a rate that is no number above 0 is told as such.
         self._check_periods(where)
+
+    def _check_transfer(self, where: str) -> None:
+        """Raises InputError for the optical map where nothing is mirrored."""
+        if self.transfer.mapping != "optical":
+            return
+        mapping = f"{where}.transfer.mapping 'optical'"
+        require(
+            len(self.mirrors) == 1,
+            f"{where}.mirrors",
+            [each.frame for each in self.mirrors],
+            f"one mirror for {mapping}",
+        )
+        require(
+            self.look.mode == "fixed_yaw",
+            f"{where}.look.mode",
+            self.look.mode,
+            f"'fixed_yaw' for {mapping}",
+        )
 
     # Drake's structs compare by identity and cannot be pickled: their values
     # stand for them.
@@ -407,7 +376,8 @@ def load_scenario(name: str | Path) -> Scenario:
 
     Raises:
         InputError: if there is no such scenario, it is not YAML, or a field
-            is unknown, of the wrong type or out of range.
+            is unknown, of the wrong type, out of range, or does not fit the
+            models.
     """
     return read_scenario(name)[0]
 
@@ -422,6 +392,7 @@ def read_scenario(name: str | Path) -> tuple[Scenario, list[Path]]:
     files: list[Path] = []
     scenario = _load(path, files)
     scenario.check(path.stem)
+    check_models_once(scenario, path.stem)
     return scenario, files
 
 
@@ -466,6 +437,8 @@ def _load(path: Path, files: list[Path]) -> Scenario:
         )
         if base.endswith((".yaml", ".yml")):
             base = path.parent / base
-        defaults = _load(find_scenario(base), files)
+        with naming(f"{path.stem}.{_EXTENDS}"):
+            found = find_scenario(base)
+        defaults = _load(found, files)
     data = anchored(data, Scenario, path.parent)
     return typed(Scenario, data, where=path.stem, defaults=defaults)

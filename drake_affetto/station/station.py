@@ -4,6 +4,7 @@ Long: all wires of the Diagram stand side by side.
 """
 
 from collections.abc import Sequence
+import dataclasses
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,6 +38,7 @@ from drake_affetto.perception.blob_sensor import BlobSensor
 from drake_affetto.perception.gaze import GazeMode, GazeTask
 from drake_affetto.perception.gaze_servo import GazeServo, gaze_view
 from drake_affetto.perception.mirror_camera import MirrorCamera
+from drake_affetto.pneumatics.actuation import PneumaticActuationConfig
 from drake_affetto.pneumatics.driver import (
     AddPneumaticDriver,
     PneumaticDriver,
@@ -44,6 +46,7 @@ from drake_affetto.pneumatics.driver import (
 )
 from drake_affetto.pneumatics.parameters import (
     JointActuator,
+    load_parameters,
     pressure_differences,
 )
 from drake_affetto.scene import world
@@ -53,10 +56,12 @@ from drake_affetto.sensing.joint_sensors import JointSensors
 from drake_affetto.skill.policy import SkillPolicy
 from drake_affetto.sound.microphone import DrumMicrophone
 from drake_affetto.station.gaze_turn import add_gaze_turn
+from drake_affetto.station.model_check import check_scene
 from drake_affetto.station.scenario import Scenario
 from drake_affetto.teaching.kinesthetic_teacher import KinestheticTeacher
 from drake_affetto.teaching.mouse_teacher import MouseTeacher
 
+_PALM = "affetto::right_palm"
 _MODES = {"centre": GazeMode.CENTER, "fixed_yaw": GazeMode.FIXED_YAW}
 
 
@@ -161,10 +166,11 @@ class AffettoStation(Diagram):
         self.plant, self.scene_graph = AddMultibodyPlant(
             scenario.plant_config, builder
         )
-        world.add_world(self.plant, scenario.world)
+        world.add_world(self.plant, scenario.body.world(scenario.world))
         world.weld_inactive(self.plant, scenario.active_joints)
         set_joint_damping(self.plant, scenario.joint_damping)
         self.plant.Finalize()
+        scenario.body.set_hand(self.plant, self.scene_graph)
         self._yaw = scenario.active_joints.index(scenario.yaw_joint)
         self._robot = world.robot_instance(self.plant)
         self.pneumatics = self._add_pneumatics(builder)
@@ -195,6 +201,7 @@ class AffettoStation(Diagram):
             )
         builder.BuildInto(self)
         self.set_name("affetto_station")
+        check_scene(self, self.plant, self.camera, scenario, "scenario")
 
     @property
     def num_joints(self) -> int:
@@ -231,6 +238,9 @@ class AffettoStation(Diagram):
         """
         mine = self._mine(context)
         self.SetDefaultContext(mine)
+        self.scenario.body.set_masses(
+            self.plant, self._sub(self.plant, context)
+        )
         held = self.pneumatics.hold_posture(self, mine)
         if self.controller is not None:
             known = self._gravity.reset(
@@ -372,7 +382,7 @@ class AffettoStation(Diagram):
                 joints={
                     name: JointActuator() for name in scenario.active_joints
                 },
-                pneumatics=scenario.pneumatics,
+                pneumatics=self._actuators(),
                 control=scenario.control if controlled else None,
             ),
             self.plant,
@@ -380,6 +390,18 @@ class AffettoStation(Diagram):
             builder,
             sense if scenario.variation.enabled else None,
             longest_delay=self._variation.actuators.longest_delay,
+        )
+
+    def _actuators(self) -> PneumaticActuationConfig:
+        """Actuators and air supply as the robot's body has them."""
+        pneumatics = self.scenario.pneumatics
+        known = load_parameters(pneumatics.parameters, pneumatics.overlays)
+        return dataclasses.replace(
+            pneumatics,
+            parameters=self.scenario.body.actuators(
+                known, self.scenario.active_joints
+            ),
+            overlays=[],
         )
 
     def _add_teacher(
@@ -393,6 +415,7 @@ class AffettoStation(Diagram):
                 scene_graph=self.scene_graph,
                 meshcat=mouse,
                 config=teaching,
+                palm_frame=_PALM,
             )
             pull = self.mouse_teacher.get_pulling_force_output_port()
         else:
@@ -401,6 +424,7 @@ class AffettoStation(Diagram):
                 plant=self.plant,
                 joint_names=self.joints.names,
                 config=teaching,
+                palm_frame=_PALM,
             )
             builder.Connect(
                 self._true_state,
@@ -424,7 +448,7 @@ class AffettoStation(Diagram):
             builder=builder,
             plant=self.plant,
             scene_graph=seen,
-            config=self.scenario.camera,
+            config=self.scenario.body.camera(self.scenario.camera),
             mirrors=self.scenario.mirrors,
             render_config=self.scenario.rendering,
         )

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+from drake_affetto.common.errors import naming
 from drake_affetto.common.fields import file_name, file_names
 from drake_affetto.common.yaml_config import load_config
 from drake_affetto.pneumatics.variation import ActuatorVariation
@@ -49,7 +50,8 @@ class VariationConfig:
 
     def check(self, where: str) -> None:
         """Raises InputError for a file or a value in it that does not fit."""
-        self.load()
+        with naming(where):
+            self.load()
 
     def load(self) -> VariationParameters:
         """Reads the parameters.

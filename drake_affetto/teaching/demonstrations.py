@@ -36,6 +36,11 @@ from drake_affetto.common.errors import (
     require_array,
     require_file,
 )
+from drake_affetto.common.log_limits import (
+    load_limits,
+    require_between,
+    require_times,
+)
 from drake_affetto.common.output import atomic_path, write_target
 from drake_affetto.common.typing import Array
 
@@ -317,7 +322,13 @@ def from_robot_csv(
             "a lower and a higher angle",
         )
         columns.append(f"q{list(joints).index(name)}")
-    table = np.stack(list(read_columns(path, columns).values()), axis=1)
+    data = read_columns(path, columns)
+    possible = load_limits()
+    low, high = possible.angle
+    require_times(path, data["t"], possible)
+    for column in columns[1:]:
+        require_between(path, column, data, low, high, "% of the range")
+    table = np.stack(list(data.values()), axis=1)
     lower, upper = np.array([tuple(pair) for pair in limits.values()]).T
     try:
         return Demonstration(

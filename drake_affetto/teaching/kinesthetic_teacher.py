@@ -11,6 +11,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, DiscreteValues
 from drake_affetto.common.errors import require
 from drake_affetto.common.systems import input_port
 from drake_affetto.common.typing import Array
+from drake_affetto.scene.parts import find_frame
 from drake_affetto.teaching.hand_force import HandForce
 from drake_affetto.teaching.stroke import (
     Stroke,
@@ -72,7 +73,7 @@ class KinestheticTeacher(HandForce):
         joints = [plant.GetJointByName(name) for name in joint_names]
         self._q_index = np.array([j.position_start() for j in joints])
         self._v_index = np.array([j.velocity_start() for j in joints])
-        palm = plant.GetFrameByName(palm_frame)
+        palm = find_frame(plant, palm_frame)
         # Their index, for frames and bodies keep the plant, see `weakly`.
         self._body_index = palm.body().index()
         self._p_BoPalm = palm.GetFixedPoseInBodyFrame().translation()

@@ -22,6 +22,7 @@ from pydrake.systems.framework import (
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.systems import connect, input_port
 from drake_affetto.common.typing import Array
+from drake_affetto.scene.parts import find_frame
 from drake_affetto.teaching.hand_force import HandForce
 from drake_affetto.teaching.stroke import TeacherConfig
 
@@ -89,7 +90,7 @@ class MouseTeacher(HandForce):
         super().__init__()
         config.check("teaching")
         self._config = config
-        hand = plant.GetFrameByName(palm_frame).body()
+        hand = find_frame(plant, palm_frame).body()
         # The mouse spring is as stiff, and critically damped for the hand.
         self._mouse_damping = (config.stiffness * hand.default_mass()) ** 0.5
         self._force_in = self.DeclareAbstractInputPort(
@@ -148,7 +149,7 @@ class MouseTeacher(HandForce):
         )
 
         require_mouse_spring()
-        hand = plant.GetFrameByName(palm_frame).body()
+        hand = find_frame(plant, palm_frame).body()
         visualization = VisualizationConfig(
             publish_illustration=False,
             publish_proximity=False,

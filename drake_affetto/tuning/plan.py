@@ -2,17 +2,23 @@
 
 from collections.abc import Sequence
 import dataclasses
+from pathlib import Path
 
-from drake_affetto.common.errors import require
+from pydrake.multibody.plant import MultibodyPlant
+
+from drake_affetto.common.errors import naming, require
 from drake_affetto.control.pidf import (
     load_control,
 )
-from drake_affetto.station.scenario import load_scenario
+from drake_affetto.scene import world
+from drake_affetto.station.scenario import Scenario, load_scenario
 from drake_affetto.tuning.config import (
     DEFAULT_FILE,
     START_FILE,
+    TuningConfig,
     load_tuning,
 )
+from drake_affetto.tuning.references import joint_range
 
 GAINS = ("kP", "kI", "kD", "kF")
 
@@ -85,7 +91,8 @@ def load_plan(
         len(set(chosen)) == len(chosen), "--joints", chosen, "no joint twice"
     )
     load_control(start).for_joints(active)
-    load_tuning(tuning)
+    with naming(Path(tuning).name):
+        _check_excursions(load_tuning(tuning), loaded)
     return TunePlan(
         joints=tuple(joint for joint in active if joint in chosen),
         seed=seed,
@@ -93,3 +100,15 @@ def load_plan(
         start=start,
         tuning=tuning,
     )
+
+
+def _check_excursions(tuning: TuningConfig, scenario: Scenario) -> None:
+    """Raises InputError for excursions that the scenario's joints have not."""
+    active = scenario.active_joints
+    for name, pair in tuning.excursions.items():
+        expected = f"one of the active joints {', '.join(active)}"
+        require(name in active, f"excursions.{name}", pair, expected)
+    plant = MultibodyPlant(scenario.plant_config.time_step)
+    world.add_world(plant, scenario.world)
+    start = [world.get_joint(plant, n).get_default_angle() for n in active]
+    joint_range(tuning, active, start, *world.joint_limits(plant, active))

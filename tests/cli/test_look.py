@@ -33,8 +33,12 @@ def test_a_drum_that_cannot_be_looked_at_is_refused(capsys, tmp_path):
     for place, words in (
         (["0.2", "0.35"], "cannot be centered"),
         (["2.0", "0.0"], "drum position"),
+        (["0.2", "-9e2"], "drum position is [0.2, -900.0]"),
+        (["0.2", "-inf"], "drum position[1] is -inf"),
+        (["0.2", "-1_0"], "--drum"),
+        (["1_0", "0"], "--drum: '1_0' is not a number"),
     ):
-        options = ["--drum", *place, "--out", str(tmp_path)]
+        options = ["--drum", *place, "--out", str(tmp_path / "new")]
         assert main(["look", *options]) == 2
         assert words in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

@@ -133,6 +133,21 @@ def test_wrong_words_are_one_line_and_exit_2(command, capsys, words, named):
     assert err.endswith("\n")
 
 
+@pytest.mark.parametrize("word", ["-9e-2", "-.5", "-3.", "-1E+5", "-inf", "-7"])
+def test_negative_numbers_of_any_notation_are_no_options(command, word):
+    got = []
+
+    def run(args):
+        got.append(args.place)
+
+    command(run)
+    sys.modules["drake_affetto.cli.probe"].add_arguments = lambda parser: (
+        parser.add_argument("--place", nargs=2, type=float)
+    )
+    assert cli.main(["probe", "--place", "0.2", word]) == 0
+    assert got == [[0.2, float(word)]]
+
+
 def test_input_error_is_one_line_and_exit_2(command, capsys):
     def run(args):
         raise InputError("control.gain is -1,\n  expected a positive number")

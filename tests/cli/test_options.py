@@ -2,11 +2,12 @@
 
 import argparse
 import dataclasses
+import re
 
 import pytest
 
 from drake_affetto.cli import options
-from drake_affetto.cli.main import main, make_parser
+from drake_affetto.cli.main import COMMANDS, main, make_parser
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.fields import number, option
 from drake_affetto.experiments.plans import DrumPlan, TeachPlan
@@ -78,3 +79,29 @@ def test_worker_count_has_limits():
     assert options.worker_count(argparse.Namespace(workers=None)) == 2
     with pytest.raises(InputError, match="--workers is 257"):
         options.worker_count(argparse.Namespace(workers=257))
+
+
+@pytest.mark.parametrize("text", ["1_0", "٣", "many", "1.5.2", "0x10"])
+def test_numbers_are_decimal_digits(text):
+    for read in (options.whole_number, options.real_number):
+        with pytest.raises(argparse.ArgumentTypeError, match=re.escape(text)):
+            read(text)
+    assert options.whole_number("-10") == -10
+    assert options.real_number("-9e-2") == -0.09
+
+
+def test_every_number_of_a_command_is_read_so():
+    """Whatever option of whatever command takes a number."""
+    found = 0
+    for command in COMMANDS:
+        parser = make_parser(command)
+        (commands,) = (
+            a for a in parser._actions if isinstance(a.choices, dict)
+        )
+        for action in commands.choices[command]._actions:
+            assert action.type not in (int, float), (command, action.dest)
+            found += action.type in (
+                options.whole_number,
+                options.real_number,
+            )
+    assert found > 20

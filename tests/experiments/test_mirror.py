@@ -15,7 +15,7 @@ from drake_affetto.experiments.skills import fit_scheme, make_skill
 from drake_affetto.experiments.trials import run_task
 from drake_affetto.runner.executor import TrialExecutor
 from drake_affetto.runner.store import TrialStore
-from drake_affetto.skill.scheme_names import STUDY_SCHEMES
+from drake_affetto.skill.scheme_names import SCHEMES
 from drake_affetto.station.scenario import load_scenario
 from support import fake_world
 
@@ -41,9 +41,9 @@ def outcome(tmp_path_factory):
 
 def test_results_hold_what_is_promised(outcome):
     results = to_plain(outcome.results)
-    assert list(results["schemes"]) == list(STUDY_SCHEMES)
+    assert list(results["schemes"]) == list(SCHEMES)
     for scheme in results["schemes"].values():
-        assert list(scheme) == ["2", "3", "4", "5"]
+        assert list(scheme) == ["1", "2", "3", "4", "5"]
         for row in scheme.values():
             rate = row["success_rate"]
             assert rate["low"] <= rate["mean"] <= rate["high"]
@@ -55,8 +55,8 @@ def test_results_hold_what_is_promised(outcome):
             assert row["per_repeat"] == hits.mean(axis=1).tolist()
     # Every pair by success; by landing the pairs that were named beforehand.
     rows = results["comparisons"]
-    assert len(rows) == 4 * 15 + 4 * 2
-    assert sum(row["measure"] == "landing" for row in rows) == 4 * 2
+    assert len(rows) == 5 * 28 + 5 * 2
+    assert sum(row["measure"] == "landing" for row in rows) == 5 * 2
     primary = [row for row in rows if row["primary"]]
     assert {
         (row["a"], row["b"], row["samples"], row["measure"]) for row in primary

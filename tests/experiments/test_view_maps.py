@@ -5,6 +5,7 @@ import pytest
 
 from drake_affetto.experiments import view_maps
 from drake_affetto.geometry.region import grid_inside
+from drake_affetto.perception.knowledge import CalibrationError
 
 
 @pytest.fixture(scope="module")
@@ -119,14 +120,24 @@ def test_more_samples_are_no_worse_and_the_same_seed_gives_the_same(mirror):
     assert many < few
 
 
-def test_a_wrong_camera_is_wrong_by_as_much_as_is_said(reference):
-    model = reference.sight.model
-    error = view_maps.CalibrationError(focal=0.01, angle=0.02, position=0.005)
-    wrong = view_maps.with_error(model, error, np.random.default_rng(0))
-    assert abs(wrong.camera.focal_x / model.camera.focal_x - 1) == (
-        pytest.approx(0.01)
-    )
-    X = np.linalg.inv(model.X_AC) @ wrong.X_AC
-    angle = np.arccos((np.trace(X[:3, :3]) - 1) / 2)
-    assert angle == pytest.approx(0.02, rel=0.02)
-    assert np.linalg.norm(X[:3, 3]) == pytest.approx(0.005)
+def test_the_optical_map_with_a_wrong_camera_is_another_one(mirror):
+    optical = view_maps.make_optical_map(mirror.view, mirror.reference)
+    true = optical.parameters_of(mirror.view.sight.mirrors[0].X_WM)
+
+    def furthest(error):
+        wrong = view_maps.with_wrong_camera(
+            optical, error, np.random.default_rng(0)
+        )
+        guessed = wrong.apply(true, mirror.target)
+        return float(mirror.distance(guessed).max())
+
+    exact = furthest(CalibrationError())
+    assert exact < 0.003
+    for name, size in (
+        ("focal", 0.05),
+        ("angle", 0.02),
+        ("position", 0.01),
+        ("height", 0.01),
+        ("neck", 0.01),
+    ):
+        assert furthest(CalibrationError(**{name: size})) > exact + 1e-4, name

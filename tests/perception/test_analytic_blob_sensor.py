@@ -111,7 +111,7 @@ def test_what_the_twin_cannot_do_it_refuses(twins):
     world.camera.set_effects(world.context, effects)
     with pytest.raises(InputError, match="radius is -1"):
         AnalyticBlobSensor(world.plant, CameraConfig(frame="camera"), radius=-1)
-    with pytest.raises(InputError, match="no frame 'bell::marker'"):
+    with pytest.raises(InputError, match="marker is 'bell::marker'"):
         AnalyticBlobSensor(
             world.plant,
             CameraConfig(frame="camera"),

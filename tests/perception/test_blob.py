@@ -1,5 +1,7 @@
 """Finding the marker in drawn images whose truth is known exactly."""
 
+from hypothesis import given
+from hypothesis import strategies as st
 import numpy as np
 import pytest
 
@@ -228,3 +230,135 @@ def test_a_whole_marker_is_left_as_it_is():
             assert detect(image, BlobConfig()) == detect(
                 image, BlobConfig(complete=False)
             )
+
+
+SKIN = (212, 164, 137)
+
+
+def draw_bar(image, u, v, angle, width, color=SKIN):
+    """A straight bar through (u, v), with edges covered in part."""
+    n = 4
+    offset = (np.arange(n) + 0.5) / n - 0.5
+    y, x = np.mgrid[: image.shape[0], : image.shape[1]]
+    cover = np.zeros(image.shape[:2])
+    for dy in offset:
+        for dx in offset:
+            across = (x + dx - u) * np.sin(angle) - (y + dy - v) * np.cos(angle)
+            cover += np.abs(across) <= width / 2
+    cover = cover[:, :, None] / n**2
+    return np.rint(cover * np.array(color) + (1 - cover) * image).astype(
+        np.uint8
+    )
+
+
+def barred(radius, width, count, noise, seed=0):
+    """Markers with a bar anywhere across them: (truth (2,), found)."""
+    rng = np.random.default_rng(seed)
+    for k in range(count):
+        u, v = rng.uniform([70, 60], [130, 90])
+        angle = rng.uniform(0, np.pi)
+        aside = rng.uniform(-0.8, 0.8) * radius
+        image = draw_disc(u, v, radius, squeeze=0.75, shape=(150, 200))
+        image = draw_bar(
+            image,
+            u - aside * np.sin(angle),
+            v + aside * np.cos(angle),
+            angle,
+            width,
+        )
+        image = apply_effects(image, ImageEffects(noise=noise), time=k)
+        yield np.array([u, v]), detect(image, BlobConfig())
+
+
+@pytest.mark.parametrize("noise", [0.0, 3.0])
+@pytest.mark.parametrize("width", [2.0, 3.0, 5.0, 8.0, 12.0])
+def test_parts_beside_a_bar_are_put_together(width, noise):
+    """The marker at the size in which it is seen directly: all are found."""
+    for truth, blob in barred(27.0, width, 25, noise):
+        assert blob is not None
+        assert np.hypot(blob.u - truth[0], blob.v - truth[1]) < 0.8
+
+
+@pytest.mark.parametrize("width", [2.0, 3.0, 5.0, 8.0])
+def test_a_smaller_one_is_put_together_or_not_found(width):
+    lost = 0
+    for truth, blob in barred(15.0, width, 40, 2.0):
+        if blob is None:
+            lost += 1
+            continue
+        assert np.hypot(blob.u - truth[0], blob.v - truth[1]) < 1.0
+    assert lost <= 4
+
+
+def test_a_stick_through_the_middle_does_not_move_it():
+    for angle in np.linspace(0, np.pi, 9):
+        image = draw_disc(160.3, 120.6, 27.0, squeeze=0.75)
+        image = draw_bar(image, 160.3, 120.6, angle, 4.0)
+        blob = detect(image, BlobConfig())
+        assert blob is not None
+        assert np.hypot(blob.u - 160.3, blob.v - 120.6) < 0.3
+
+
+def test_two_markers_side_by_side_are_not_one():
+    for gap in (3.0, 6.0, 12.0):
+        image = draw_disc(130.0, 120.0, 14.0, squeeze=0.8)
+        image = draw_disc(158.0 + gap, 120.0, 13.0, squeeze=0.8, image=image)
+        blob = detect(image, BlobConfig())
+        assert blob is not None
+        assert np.hypot(blob.u - 130.0, blob.v - 120.0) < 0.2
+
+
+def test_less_than_half_of_a_marker_is_not_found():
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        angle = rng.uniform(0, 2 * np.pi)
+        image = draw_disc(160.0, 120.0, 25.0, squeeze=0.8)
+        # A wide cover whose edge is beyond the middle: 15 to 35 % are seen.
+        aside = -rng.uniform(0.25, 0.5) * 20.0 + 100.0
+        image = draw_bar(
+            image,
+            160.0 - aside * np.sin(angle),
+            120.0 + aside * np.cos(angle),
+            angle,
+            200.0,
+        )
+        assert detect(image, BlobConfig()) is None
+        # It is there, but hardly believed.
+        seen = detect(image, BlobConfig(min_confidence=0.0))
+        assert seen is not None
+        assert seen.confidence < 0.35
+
+
+@given(st.floats(0.0, 1.0))
+def test_nothing_is_found_below_the_confidence_that_is_set(least):
+    image = draw_disc(60.0, 40.0, 3.0, squeeze=0.6, shape=(80, 120))
+    blob = detect(image, BlobConfig(min_confidence=0.0))
+    assert blob is not None
+    assert 0.2 < blob.confidence < 0.9
+    found = detect(image, BlobConfig(min_confidence=least))
+    assert found == (blob if blob.confidence >= least else None)
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        np.zeros((40, 60), np.uint8),
+        np.zeros((40, 60, 1), np.uint8),
+        np.zeros((40, 60, 2), np.uint8),
+        np.zeros((40, 60, 3), np.uint16),
+        np.zeros((40, 60, 3), float),
+        np.zeros((40, 60, 4), np.float32),
+        np.zeros((2, 40, 60, 3), np.uint8),
+        [[[0, 0, 0]]],
+        None,
+    ],
+)
+def test_what_is_no_color_image_of_8_bits_is_refused(image):
+    with pytest.raises(InputError, match=r"^image is .*expected an array \(h"):
+        detect(image, BlobConfig())
+
+
+def test_an_image_may_be_read_only_and_a_view():
+    image = draw_disc(100.3, 80.7, 8)
+    view = np.broadcast_to(image[::-1][::-1], image.shape)
+    assert detect(view, BlobConfig()) == detect(image, BlobConfig())

@@ -324,7 +324,7 @@ def test_tint_and_blur_change_the_reflection_only():
 def test_settings_that_do_not_fit_are_named():
     builder = DiagramBuilder()
     plant, _ = scene.add_scene(builder)
-    with pytest.raises(InputError, match="no frame 'head::eye'"):
+    with pytest.raises(InputError, match=r"camera\.frame is 'head::eye'"):
         MirrorCamera(plant, CameraConfig(frame="head::eye"))
     with pytest.raises(InputError, match=r"camera\.width is 2"):
         MirrorCamera(plant, CameraConfig(frame="camera", width=2))

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from drake_affetto.perception.blob import BlobCalibration
-from drake_affetto.perception.optical_map import OpticalMap
+from drake_affetto.perception.optical_map import OpticalMap, PlaneExpectation
 from drake_affetto.skill.elm import ElmRegressor
 from drake_affetto.skill.mappings import Domain
 from drake_affetto.skill.optical import OpticalMapping
@@ -157,3 +157,64 @@ def test_transfer_learns_the_mirror_from_three_samples():
     np.testing.assert_allclose(
         transfer.parameters_, mapping.parameters_of(MIRROR.X_WM), atol=0.02
     )
+
+
+def _skilled(tau_range, skill):
+    rng = np.random.default_rng(1)
+    tau = rng.uniform(*np.transpose(tau_range), (60, 2))
+    return ElmRegressor(
+        n_hidden=50, alpha=1e-6, input_range=tau_range, random_state=0
+    ).fit(tau, skill(tau))
+
+
+def test_one_sample_and_where_a_mirror_may_stand_are_enough():
+    known = optical()
+    X, tau, _ = samples(known, 60)
+    limits = [[0.0, 2.0], [-1.0, 0.5]]
+
+    def skill(tau):
+        y, yaw = tau.T
+        return np.stack([yaw, y, np.sin(2 * y + 3 * yaw), y * yaw], axis=-1)
+
+    elm = _skilled(limits, skill)
+    # The mirror's own middle is on its plane, and it leans as it leans.
+    n = MIRROR.X_WM[:3, 2]
+    lean = float(np.arcsin(n[2]))
+    worst = []
+    for shift in (0.0, 0.1):
+        foot = (MIRROR.X_WM[:3, 3] + shift * n).tolist()
+        plane = PlaneExpectation(foot, 0.01, lean, 0.01)
+        mapping = OpticalMapping(**vars(known) | {"plane": plane})
+        with pytest.warns(UserWarning, match="1 samples determine"):
+            transfer = TransferRegressor(elm, mapping, domain=limits).fit(
+                X[:1], skill(tau[:1])
+            )
+        error = transfer.predict(X) - elm.predict(tau)
+        worst.append(np.abs(error).max())
+    assert worst[0] < 0.05 < worst[1]
+
+
+def test_what_is_expected_of_the_plane_is_its_distance_and_its_lean():
+    plane = PlaneExpectation([0.35, 0.3, 0.0], 0.1, -0.1, 0.2)
+    mapping = OpticalMapping(**vars(optical()) | {"plane": plane})
+    assert optical().unexpected(np.zeros((1, 3))) is None
+    p = np.random.default_rng(0).normal(size=(5, 3))
+    residual, slope = mapping.expectation(p)
+    eye = mapping.target.camera_pose(YAW)[:3, 3]
+    for row, (azimuth, elevation, s) in zip(residual, p, strict=True):
+        n = np.array(
+            [
+                np.cos(elevation) * np.cos(azimuth),
+                np.cos(elevation) * np.sin(azimuth),
+                np.sin(elevation),
+            ]
+        )
+        foot = np.array(plane.foot) - (eye - s * n)
+        np.testing.assert_allclose(
+            row, [foot @ n / 0.1, (elevation + 0.1) / 0.2], atol=1e-12
+        )
+    for k in range(3):
+        step = 1e-6 * np.eye(3)[k]
+        change = mapping.expectation(p + step)[0]
+        change = change - mapping.expectation(p - step)[0]
+        np.testing.assert_allclose(slope[:, :, k], change / 2e-6, atol=1e-7)

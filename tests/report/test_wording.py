@@ -5,7 +5,7 @@ import pytest
 from drake_affetto.report import wording
 from drake_affetto.report.comparison import SchemeComparison
 from drake_affetto.report.style import SYMBOLS
-from drake_affetto.skill.scheme_names import STUDY_SCHEMES
+from drake_affetto.skill.scheme_names import SCHEMES
 from support import report_data
 from support.report_page import compare, make, typed
 
@@ -139,7 +139,7 @@ def test_percent_never_rounds_to_certainty():
 
 
 def test_every_scheme_has_a_label_and_a_color():
-    assert tuple(wording.SCHEMES) == STUDY_SCHEMES
-    assert set(SYMBOLS) == set(STUDY_SCHEMES)
-    for name in STUDY_SCHEMES:
+    assert tuple(wording.SCHEMES) == SCHEMES
+    assert set(SYMBOLS) == set(SCHEMES)
+    for name in SCHEMES:
         assert wording.in_text(name) != name

@@ -1,11 +1,15 @@
 """Drum placement, postures, joint selection, and errors that name things."""
 
+from pathlib import Path
+
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
 from drake_affetto.common.errors import InputError
+from drake_affetto.common.resources import models_dir
 from drake_affetto.scene import world
+from support.drumming_scene import build_scene
 
 ACTIVE = list(world.ACTIVE_JOINTS)
 
@@ -190,7 +194,20 @@ def test_a_world_that_does_not_fit_is_told_in_one_line(config, told):
             "tabor.sdf",
             "<sdf version='1.9'><model name='tabor'><link name='shell'/>"
             "</model></sdf>",
-            "tabor.sdf has no frame head_center",
+            "models in .*tabor.sdf is .'tabor'., expected one, named drum",
+        ),
+        (
+            "drum",
+            "drum.sdf",
+            "<sdf version='1.9'><model name='drum'><link name='shell'/>"
+            "<link name='head'/></model></sdf>",
+            "drum.sdf has no frame 'drum::head_center'",
+        ),
+        (
+            "drum",
+            "empty.sdf",
+            "<sdf version='1.9'><model name='drum'/></sdf>",
+            "empty.sdf",
         ),
         (
             "drum",
@@ -202,7 +219,13 @@ def test_a_world_that_does_not_fit_is_told_in_one_line(config, told):
             "directives",
             "empty.dmd.yaml",
             "directives: []",
-            "empty.dmd.yaml has no model affetto",
+            "empty.dmd.yaml has no frame 'affetto::pelvis'",
+        ),
+        (
+            "directives",
+            "twice.dmd.yaml",
+            "directives: []\ndirectives: []",
+            "twice.dmd.yaml: directives is given twice, in lines 1 and 2",
         ),
         (
             "directives",
@@ -227,3 +250,81 @@ def test_files_that_do_not_fit_are_told_in_one_line(
     with pytest.raises(InputError, match=told) as error:
         world.add_world(plant, world.WorldConfig(**{field: str(path)}))
     assert "\n" not in str(error.value)
+
+
+def write_changed(tmp_path, name: str, *changes: tuple[str, str]) -> str:
+    """A copy of a file of the models, with texts replaced; its path."""
+    text = (models_dir() / name).read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    path = tmp_path / Path(name).name
+    path.write_text(text)
+    return str(path)
+
+
+STATIC = ('<model name="drum">', '<model name="drum"><static>true</static>')
+WELD = ("    child: affetto::pelvis", "    child: affetto::lumbar_pitch_link")
+
+
+def test_a_drum_that_is_static_is_refused(tmp_path):
+    drum = write_changed(tmp_path, "sdf/drum.sdf", STATIC)
+    with pytest.raises(InputError, match=r"drum\.sdf: drum::shell is static"):
+        world.add_world(MultibodyPlant(0.001), world.WorldConfig(drum=drum))
+
+
+def test_a_drum_of_loose_parts_is_refused(tmp_path):
+    drum = write_changed(
+        tmp_path,
+        "sdf/drum.sdf",
+        ("</model>", '<link name="stick"/></model>'),
+    )
+    with pytest.raises(InputError, match=r"drum::stick is not fixed to drum::"):
+        world.add_world(MultibodyPlant(0.001), world.WorldConfig(drum=drum))
+
+
+def test_a_robot_that_is_welded_elsewhere_is_refused(tmp_path):
+    directives = write_changed(tmp_path, "scenes/drumming.dmd.yaml", WELD)
+    config = world.WorldConfig(directives=directives)
+    with pytest.raises(InputError, match=r"affetto::pelvis is not welded"):
+        world.add_world(MultibodyPlant(0.001), config)
+
+
+def test_another_model_may_have_parts_of_the_same_names(tmp_path, scene):
+    """A second table, with bodies and frames called as the scene's own."""
+    other = tmp_path / "other.sdf"
+    links = "".join(
+        f"<link name='{name}'/>"
+        for name in ("table_top", "shell", "right_hand", "right_palm", "mirror")
+    )
+    frames = "".join(
+        f"<frame name='{name}' attached_to='shell'/>"
+        for name in ("marker", "head_center", "eye_camera")
+    )
+    other.write_text(
+        f"<sdf version='1.9'><model name='other'><static>true</static>{links}"
+        f"{frames}</model></sdf>"
+    )
+    directives = write_changed(
+        tmp_path,
+        "scenes/drumming.dmd.yaml",
+        (
+            "directives:\n",
+            f"directives:\n- add_model: {{name: other, file: file://{other}}}\n",
+        ),
+    )
+    built = build_scene(0.001, world.WorldConfig(directives=directives))
+    for measure in (
+        world.table_extents,
+        world.drum_radius,
+        world.head_radius,
+        world.hand_radius,
+        world.marker_radius,
+        world.mirror_size,
+        world.marker_position,
+        world.head_center_position,
+    ):
+        np.testing.assert_allclose(
+            measure(built.plant, built.context),
+            measure(scene.plant, scene.context),
+        )

@@ -299,3 +299,50 @@ def test_bad_data_are_named():
         elm.partial_fit(X, y[:, :2])
     with pytest.raises(ValueError, match=r"y has shape .* expect"):
         elm.partial_fit(X, y[:, 0])
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("alpha", 1.0),
+        ("n_hidden", 7),
+        ("weight_scale", 2.0),
+        ("input_range", [[0.0, 2.0]] * 2),
+        ("random_state", 5),
+    ],
+)
+def test_a_parameter_set_too_late_is_refused(name, value):
+    X = np.random.default_rng(0).uniform(size=(6, 2))
+    model = ElmRegressor(n_hidden=5, random_state=0).partial_fit(X, X)
+    before = model.predict(X)
+    model.set_params(**{name: value})
+    with pytest.raises(ValueError, match=f"{name} is .*begun with"):
+        model.partial_fit(X, X)
+    assert np.array_equal(model.predict(X), before)
+    # `fit` begins anew, with it.
+    model.fit(X, X).partial_fit(X, X)
+
+
+def test_a_limit_that_is_changed_in_place_is_seen():
+    X = np.random.default_rng(0).uniform(size=(6, 2))
+    limits = np.array([[0.0, 1.0], [0.0, 1.0]])
+    model = ElmRegressor(input_range=limits, random_state=0).partial_fit(X, X)
+    model.partial_fit(X, X)
+    limits[0, 1] = 5.0
+    with pytest.raises(ValueError, match="input_range is"):
+        model.partial_fit(X, X)
+
+
+def test_forgetting_may_change_and_does_have_an_effect():
+    """As the weighted ridge regression over both portions has it."""
+    X = np.random.default_rng(0).uniform(size=(40, 2))
+    model = ElmRegressor(n_hidden=5, random_state=0).partial_fit(X, X)
+    model.set_params(forgetting=0.8).partial_fit(X, 2 * X)
+    phi = np.vstack([model.hidden(X)] * 2)
+    y = np.vstack([X, 2 * X])
+    weight = np.append(np.full(40, 0.8**40), 0.8 ** np.arange(39, -1, -1))
+    gram = phi.T @ (weight[:, None] * phi) + model.alpha * np.eye(5)
+    expected = np.linalg.solve(gram, phi.T @ (weight[:, None] * y))
+    np.testing.assert_allclose(model.coef_, expected, rtol=1e-6)
+    with pytest.raises(ValueError, match="forgetting is 2"):
+        model.set_params(forgetting=2.0).partial_fit(X, X)

@@ -9,13 +9,18 @@ from numpy.testing import assert_allclose
 import pytest
 from scipy.optimize import check_grad, minimize
 from sklearn.base import clone
+from sklearn.compose import ColumnTransformer
+from sklearn.ensemble import RandomForestRegressor
 from sklearn.exceptions import NotFittedError
 from sklearn.frozen import FrozenEstimator
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF
 from sklearn.kernel_ridge import KernelRidge
 from sklearn.linear_model import Ridge
+from sklearn.neighbors import KNeighborsRegressor
 from sklearn.neural_network import MLPRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import check_estimator
 
 from drake_affetto.skill import (
@@ -471,8 +476,9 @@ def test_bad_data_are_named(skill):
         TransferRegressor(ElmRegressor()).fit(X, y)
     with pytest.raises(ValueError, match="NaN"):
         transfer.fit(X * np.nan, y)
-    with pytest.raises(ValueError, match="1 sample"):
+    with pytest.warns(UserWarning, match="1 samples determine at most 2"):
         transfer.fit(X[:1], y[:1])
+    assert np.isfinite(transfer.predict(X)).all()
     with pytest.raises(ValueError, match=r"y has 2 outputs.* predicts 6"):
         transfer.fit(X, y[:, :2])
     with pytest.raises(ValueError, match="X is constant"):
@@ -489,3 +495,83 @@ def test_bad_data_are_named(skill):
         TransferRegressor(linear, prior="domain").fit(X, y)
     with pytest.raises(ValueError, match="shrinkage is 2"):
         loo_covariance(skill, X, y, shrinkage=2)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        RandomForestRegressor(60, random_state=0),
+        KNeighborsRegressor(3),
+        FrozenEstimator(KNeighborsRegressor(3)),
+    ],
+    ids=["forest", "neighbors", "frozen"],
+)
+def test_a_source_without_derivatives_is_searched_without(source):
+    """Nearly as good as the source itself, were the true map known."""
+    Z = np.random.default_rng(2).uniform(-1, 1, (1500, 2))
+    inner = source.estimator if isinstance(source, FrozenEstimator) else source
+    inner.fit(Z, skill_of(Z))
+    Z_new = 0.9 * Z[:200]
+    transfer = TransferRegressor(source, domain=[[-1, 1]] * 2).fit(*few(8))
+    assert transfer.solver_ == "evolution"
+    assert np.isfinite(transfer.cost_)
+
+    def rms(y):
+        return np.sqrt(np.mean((y - skill_of(Z_new)) ** 2))
+
+    assert rms(transfer.predict(seen_anew(Z_new))) < 0.2
+    assert rms(source.predict(seen_anew(Z_new))) > 1.0
+
+
+def test_smooth_sources_are_searched_by_their_derivatives(skill):
+    assert TransferRegressor(skill).fit(*few()).solver_ == "lm"
+    _, Z, y = learned()
+    poly = KernelRidge(kernel="poly", degree=5, alpha=1e-4).fit(Z, y)
+    transfer = TransferRegressor(poly, domain=[[-1, 1]] * 2, n_starts=4)
+    assert transfer.fit(*few(6)).solver_ == "lm"
+
+
+def test_evolution_finds_what_derivatives_find(skill):
+    X, y = few(6)
+    quick = TransferRegressor(skill).fit(X, y)
+    slow = TransferRegressor(skill, solver="evolution").fit(X, y)
+    assert slow.solver_ == "evolution"
+    assert_allclose(slow.H_, quick.H_, atol=0.01)
+    assert len(slow.starts_) == len(quick.starts_)
+
+
+def test_samples_on_a_line_are_told(skill):
+    along = np.linspace(-1, 1, 6)[:, None]
+    Z = along * [0.6, 0.8]
+    for shift in (0.0, 0.01):
+        bent = Z + shift * np.array([[-0.8, 0.6]]) * np.sin(40 * along)
+        with pytest.warns(UserWarning, match="6 samples lie on a line .* 2 of"):
+            TransferRegressor(skill).fit(seen_anew(bent), skill_of(bent))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # Two different points determine a similarity.
+        TransferRegressor(skill, "similarity").fit(seen_anew(Z), skill_of(Z))
+        TransferRegressor(skill).fit(*few(6))
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_source_that_knows_its_columns_is_given_them():
+    """One that takes them by name, and one that would warn."""
+    pd = pytest.importorskip("pandas")
+    _, Z, y = learned()
+    table = pd.DataFrame(Z, columns=["a", "b"])
+    by_name = make_pipeline(
+        ColumnTransformer([("scale", StandardScaler(), ["b", "a"])]),
+        GaussianProcessRegressor(RBF(1.0), alpha=1e-4, optimizer=None),
+    )
+    scaled = make_pipeline(
+        StandardScaler(),
+        KernelRidge(kernel="rbf", alpha=1e-4, gamma=0.5),
+    )
+    for source in (by_name, scaled, Ridge(), KNeighborsRegressor(3)):
+        source.fit(table, y)
+        options = {"domain": [[-1, 1]] * 2, "n_starts": 8}
+        transfer = TransferRegressor(source, **options).fit(*few(8))
+        assert transfer.predict(few(8)[0]).shape == (8, 6)
+        if source in (by_name, scaled):
+            assert_allclose(transfer.H_, TURN.T / 3.0, atol=0.05)

@@ -85,7 +85,7 @@ def test_drakes_own_configs_are_read(tmp_path):
         ("teaching:\n  lift: {mean: 9.0}", "s.teaching.lift.mean is 9.0"),
         ("a: [1, 2", "is not YAML"),
         ("- 1\n- 2", "holds no mapping"),
-        ("extends: drumning", "no scenario 'drumning'; did you mean"),
+        ("extends: drumning", "s.extends: no scenario 'drumning'; did you"),
         ("extends: s.yaml", "extends itself"),
         ("extends: 4", "s.extends is 4"),
         ("mirrors: 7", "s.mirrors is 7, expected a list"),
@@ -117,6 +117,100 @@ def test_drakes_own_configs_are_read(tmp_path):
             "world:\n  drum: package://drake_affetto/sdf/drumm.sdf",
             "no such file: package://drake_affetto/sdf/drumm.sdf",
         ),
+        # YAML that two readers take differently.
+        ("", "s.yaml is empty"),
+        ("# nothing\n", "s.yaml is empty"),
+        ("world: {}\ngaze: {}\nworld: {}", "world is given twice, in lines 1"),
+        (
+            "gaze:\n  gain: 1.0\n  gain: 2.0",
+            "s.yaml: gaze.gain is given twice, in lines 2 and 3",
+        ),
+        ("random_seed: 010", "random_seed is 010 in line 1"),
+        ("random_seed: 1:30", "random_seed is 1:30 in line 1"),
+        ("random_seed: 1_0", "random_seed is 1_0 in line 1"),
+        ("random_seed: '10'", "s.random_seed is '10', expected a whole"),
+        ("variation:\n  enabled: yes", "is 'yes', expected true or false"),
+        ("look:\n  mode: off", "s.look.mode is 'off', expected 'centre'"),
+        ("gaze:\n  gain: .inf", "s.gaze.gain is inf, expected a finite"),
+        ("gaze:\n  gain: 1e999", "s.gaze.gain is inf, expected a finite"),
+        ("random_seed: .nan", "s.random_seed is nan, expected a whole"),
+        ("a: " + "[" * 3000, "nested more than 40 deep"),
+        ("a: " + "{a: " * 3000, "nested more than 40 deep"),
+        # Regions and depths that cannot be.
+        ("drum_region: {x: [.inf, 1]}", "s.drum_region.x[0] is inf"),
+        ("drum_region: {x: [0.2, 30]}", "s.drum_region.x[1] is 30"),
+        (
+            "drum_region: {x: [0.2, 3]}",
+            "s.drum_region is [3.0, -0.15], expected x from 0.129",
+        ),
+        (
+            "drum_region: {polygon: [[0.2, -0.2], [0.3, -0.2], [0.2, 0.9]]}",
+            "s.drum_region.polygon is [0.2, 0.9], expected x from 0.129",
+        ),
+        (
+            "camera: {near: 1.0, far: 0.5}",
+            "s.camera.near is 1.0, expected less than s.camera.far, 0.5",
+        ),
+        # What is not in the models.
+        ("yaw_joint: right_elbow_flexion", "s.yaw_joint is 'right_elbow_fl"),
+        ("yaw_joint: waist_pitch", "s.yaw_joint is 'waist_pitch'"),
+        ("camera: {frame: nose}", "s: camera.frame is 'nose', expected one"),
+        ("camera: {frame: 'a::b'}", "s: camera.frame is 'a::b', expected one"),
+        ("mirrors: [{frame: pond}]", "s: mirrors[0].frame is 'pond'"),
+        (
+            "mirrors: [{frame: 'drum::marker'}]",
+            "s: mirrors[0].width is not given",
+        ),
+        ("active_joints: [waist_yaw, knee]", "s.active_joints: model affetto"),
+        ("joint_damping: {knee: 1.0}", "s: joint_damping: model affetto"),
+        (
+            "joint_damping: {neck_yaw: 1.0}",
+            "s: joint_damping.neck_yaw is 1.0, expected the damping of an act",
+        ),
+        ("sound: nowhere.yaml", "s.sound: no such file: nowhere.yaml"),
+        (
+            "variation: {overlays: [nowhere.yaml]}",
+            "s.variation: no such file: nowhere.yaml",
+        ),
+        (
+            "pneumatics: {overlays: [nowhere.yaml]}",
+            "s.pneumatics.overlays[0]: no such file: nowhere.yaml",
+        ),
+        (
+            "control: {parameters: nowhere.yaml}",
+            "s.control.parameters: no such file: nowhere.yaml",
+        ),
+        ("extends: nowhere.yaml", "s.extends: no such scenario file"),
+        ("sound: 5", "s.sound is 5, expected text"),
+        ("active_joints: [1]", "s.active_joints[0] is 1, expected text"),
+        ("joint_damping: {5: 1.0}", "s.joint_damping has the key 5"),
+        (
+            "world: {frames: {pond: {}}}",
+            "s: world.frames: package://drake_affetto/scenes/drumming.dmd",
+        ),
+        (
+            "world: {default_posture: {neck_yaw: 3.0}}",
+            "s: world.default_posture.neck_yaw is 3.0",
+        ),
+        # What Drake would refuse in words of its own, or by ending.
+        ("plant_config: {contact_model: jelly}", "plant_config.contact_model"),
+        (
+            "plant_config: {stiction_tolerance: 0}",
+            "s.plant_config.stiction_tolerance is 0.0",
+        ),
+        (
+            "simulator_config: {integration_scheme: guess}",
+            "s.simulator_config.integration_scheme is 'guess'",
+        ),
+        ("simulator_config: {start_time: 5.0}", "simulator_config.start_time"),
+        # What fails only after work otherwise.
+        (
+            "extends: mirror\nmirrors: []",
+            "s.mirrors is [], expected one mirror for s.transfer.mapping",
+        ),
+        ("transfer: {mapping: optical}", "s.look.mode is 'centre', expected"),
+        ("wire: nowhere.yaml", "s.wire: no such file: "),
+        ("hardware: true", "s.wire: no such file"),
     ],
 )
 def test_what_does_not_fit_is_named_in_one_line(tmp_path, text, message):

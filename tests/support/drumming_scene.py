@@ -26,7 +26,9 @@ class Scene:
         self.diagram.SetDefaultContext(self.root)
 
 
-def build_scene(time_step: float) -> Scene:
+def build_scene(
+    time_step: float, config: world.WorldConfig | None = None
+) -> Scene:
     """A plant whose contact results are asked for without stepping."""
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlant(
@@ -38,7 +40,7 @@ def build_scene(time_step: float) -> Scene:
         ),
         builder,
     )
-    world.add_world(plant, world.WorldConfig())
+    world.add_world(plant, config or world.WorldConfig())
     plant.Finalize()
     diagram = builder.Build()
     root = diagram.CreateDefaultContext()

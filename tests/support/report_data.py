@@ -18,7 +18,9 @@ WINNERS = {
         "continue": 0.5,
         "transfer": 0.97,
         "transfer_default": 0.98,
+        "transfer_affine": 0.9,
         "gaussian_process": 0.6,
+        "affine_regression": 0.5,
     },
     "relearn": {
         "unchanged": 0.2,
@@ -26,7 +28,9 @@ WINNERS = {
         "continue": 0.4,
         "transfer": 0.5,
         "transfer_default": 0.6,
+        "transfer_affine": 0.5,
         "gaussian_process": 0.7,
+        "affine_regression": 0.6,
     },
     "unchanged": {
         "unchanged": 0.98,
@@ -34,7 +38,9 @@ WINNERS = {
         "continue": 0.5,
         "transfer": 0.4,
         "transfer_default": 0.5,
+        "transfer_affine": 0.4,
         "gaussian_process": 0.3,
+        "affine_regression": 0.2,
     },
     "level": {
         "unchanged": 0.2,
@@ -42,7 +48,9 @@ WINNERS = {
         "continue": 0.5,
         "transfer": 0.95,
         "transfer_default": 0.96,
+        "transfer_affine": 0.93,
         "gaussian_process": 0.9,
+        "affine_regression": 0.8,
     },
 }
 

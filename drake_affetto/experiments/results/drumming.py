@@ -189,6 +189,8 @@ class DrumResults(StudyResults):
         rewards: Reward and contact of all trials.
         similarity: Examples of Fig. 3b; None without both a hit and a miss.
         chance: Success of the best constant stroke, played blind.
+        bodies: How each repeat's robot departs from its model, by name of the
+            number; empty where all are alike.
     """
 
     KIND: ClassVar[str] = "drum"
@@ -207,6 +209,7 @@ class DrumResults(StudyResults):
     rewards: list[RewardRow]
     similarity: SimilarityTraces | None = None
     chance: SuccessRate | None = None
+    bodies: list[dict[str, float]] = field(default_factory=list)
 
     def check(self, where: str) -> None:
         """Raises InputError where parts do not fit each other."""

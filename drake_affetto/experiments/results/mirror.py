@@ -127,6 +127,8 @@ class MirrorResults(StudyResults):
         comparisons: Paired tests of the schemes.
         map: The map of the first repeat; None if no scheme found one.
         chance: Success of the best constant stroke, played blind.
+        bodies: How each repeat's robot departs from its model, by name of the
+            number; empty where all are alike.
     """
 
     KIND: ClassVar[str] = "mirror"
@@ -143,6 +145,7 @@ class MirrorResults(StudyResults):
     comparisons: list[SchemeComparisonRow]
     map: TransferMap | None = None
     chance: SuccessRate | None = None
+    bodies: list[dict[str, float]] = field(default_factory=list)
 
     def check(self, where: str) -> None:
         """Raises InputError where parts do not fit each other."""

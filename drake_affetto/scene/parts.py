@@ -1,0 +1,54 @@
+"""Frames and bodies of a scene by their scoped names, `model::name`."""
+
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame, FrameIndex, RigidBody
+
+from drake_affetto.common.errors import require
+
+
+def find_frame(plant: MultibodyPlant, name: str, field: str = "frame") -> Frame:
+    """The frame `model::frame` (or `frame`, if there is but one) of a plant.
+
+    Args:
+        plant: Plant, finalized or not.
+        name: Name of the frame.
+        field: What names the frame, for errors.
+
+    Raises:
+        InputError: If there is no such frame, or several.
+    """
+    model, _, frame = name.rpartition("::")
+    expected = "one frame of the scene, as model::frame"
+    if not model:
+        found = [
+            plant.get_frame(FrameIndex(i)) for i in range(plant.num_frames())
+        ]
+        found = [each for each in found if each.name() == frame]
+        require(len(found) == 1, field, name, expected)
+        return found[0]
+    has_model = plant.HasModelInstanceNamed(model)
+    instance = plant.GetModelInstanceByName(model) if has_model else None
+    has = has_model and plant.HasFrameNamed(frame, instance)
+    require(has, field, name, expected)
+    return plant.GetFrameByName(frame, instance)
+
+
+def find_body(
+    plant: MultibodyPlant, name: str, field: str = "body"
+) -> RigidBody:
+    """The body `model::body` of a plant.
+
+    Args:
+        plant: Plant, finalized or not.
+        name: Name of the body, with its model's.
+        field: What names the body, for errors.
+
+    Raises:
+        InputError: If there is no such body.
+    """
+    model, _, body = name.rpartition("::")
+    has_model = plant.HasModelInstanceNamed(model)
+    instance = plant.GetModelInstanceByName(model) if has_model else None
+    has = has_model and plant.HasBodyNamed(body, instance)
+    require(has, field, name, "a body of the scene, as model::body")
+    return plant.GetBodyByName(body, instance)
