@@ -107,6 +107,7 @@ def draw(path: Path, rows, plan) -> None:
 class ConditionsCommand(StudyCommand[MirrorPlan]):
     """The mirror study under each condition."""
 
+    command = "when_transfer_wins.py"
     plan = MirrorPlan
     out = "out/conditions"
 

@@ -3,6 +3,7 @@
 import argparse
 from collections.abc import Callable
 import contextlib
+from pathlib import Path
 import signal
 import sys
 import time
@@ -120,10 +121,11 @@ def run(args: argparse.Namespace) -> int:
     with contextlib.ExitStack() as stack:
         recording = None
         if args.record is not None:
+            record = Path(args.record).expanduser()
+            if record.parent.is_dir():
+                claim_file(record, "serve")
             recording = stack.enter_context(
-                WireRecording(
-                    claim_file(args.record, "serve"), codec.num_joints
-                )
+                WireRecording(record, codec.num_joints)
             )
         robot = SimulatedRobot(scenario, args.rate, meshcat)
         # Warm by now: from the first packet on time is real time.

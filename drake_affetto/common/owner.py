@@ -22,7 +22,7 @@ MARK = ".affetto.json"
 """File that says who made what, in its folder."""
 
 # The command of a study whose results do not bear its name.
-_COMMANDS = {"scenarios": "mirror"}
+_COMMANDS = {"scenarios": "mirror", "conditions": "when_transfer_wins.py"}
 
 # Files that a command puts into folders of others, since before there were
 # marks.
@@ -50,8 +50,7 @@ def claim_folder(path: str | Path, command: str) -> Path:
         write_json(folder / MARK, {**mark, "command": command})
     elif owner != command:
         raise InputError(
-            f"--out: {path} holds what `affetto {owner}` made; name another "
-            "folder"
+            f"--out: {path} holds what {_said(owner)} made; name another folder"
         )
     return folder
 
@@ -83,12 +82,17 @@ def claim_file(path: str | Path, command: str) -> Path:
     maker = files.get(target.name, owner)
     if target.exists() and maker != command:
         raise InputError(
-            f"{path} is a file that `affetto {maker}` made; name another file"
+            f"{path} is a file that {_said(maker)} made; name another file"
         )
     if files.get(target.name) != command:
         mark["files"] = {**mark.get("files", {}), target.name: command}
         write_json(target.parent / MARK, mark)
     return path
+
+
+def _said(command: str) -> str:
+    """A command as one calls it; those of analysis are scripts."""
+    return f"`{command}`" if "." in command else f"`affetto {command}`"
 
 
 def _read_mark(folder: Path) -> dict[str, Any]:

@@ -44,8 +44,7 @@ class PidfConfig:
     gravity_share: float = 0.0
 
     def check(self, where: str) -> None:
-        """Raises InputError naming the first field or file that cannot be."""
-        load_control(self.parameters, self.overlays)
+        """Raises InputError naming the first field that cannot be."""
         require_range(f"{where}.period", self.period, 1e-4, 0.1)
         require_range(f"{where}.gravity_share", self.gravity_share, 0.0, 1.0)
 

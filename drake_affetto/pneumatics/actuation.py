@@ -72,8 +72,7 @@ class PneumaticActuationConfig:
     look_ahead: float = 0.0
 
     def check(self, where: str) -> None:
-        """Raises InputError naming the first field or file that cannot be."""
-        load_parameters(self.parameters, self.overlays)
+        """Raises InputError naming the first field that cannot be."""
         require(
             self.mode in _MODES,
             f"{where}.mode",

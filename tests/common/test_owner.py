@@ -21,14 +21,19 @@ def test_a_folder_belongs_to_who_made_it(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("study", "owner"), [("drum", "drum"), ("scenarios", "mirror")]
+    ("study", "owner", "said"),
+    [
+        ("drum", "drum", "`affetto drum`"),
+        ("scenarios", "mirror", "`affetto mirror`"),
+        ("conditions", "when_transfer_wins.py", "`when_transfer_wins.py`"),
+    ],
 )
 def test_a_folder_of_an_earlier_version_is_known_by_its_results(
-    tmp_path, study, owner
+    tmp_path, study, owner, said
 ):
     (tmp_path / "results.json").write_text(json.dumps({"study": study}))
     claim_folder(tmp_path, owner)
-    with pytest.raises(InputError, match=f"`affetto {owner}` made"):
+    with pytest.raises(InputError, match=f"holds what {said} made"):
         claim_folder(tmp_path, "toy")
 
 
