@@ -510,7 +510,7 @@ def _complete(
     found = fit_arcs(part.rim)
     if found is None:
         return doubtful
-    ellipse, _ = found
+    ellipse, on_it = found
     size = ellipse.axes + 0.5
     seen = area / (math.pi * float(size[0] * size[1]))
     aspect = float(size[0] / size[1])
@@ -526,7 +526,10 @@ def _complete(
         float(ellipse.center[0]),
         float(ellipse.center[1]),
         area,
-        blob.confidence * min(1.0, seen),
+        # What is seen, and how much of its rim tells the ellipse.
+        min(1.0, area / (2.0 * config.min_area))
+        * min(1.0, seen)
+        * min(1.0, len(on_it) / len(part.rim) + 0.2),
     )
 
 

@@ -14,6 +14,7 @@ from drake_affetto.common.errors import (
     require,
     require_choice,
     require_range,
+    shown,
 )
 from drake_affetto.common.resources import models_dir, resolve
 from drake_affetto.common.yaml_config import read_yaml, typed
@@ -353,7 +354,7 @@ def _find(name: str | Path) -> Path:
         near = difflib.get_close_matches(text, known, n=1)
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise InputError(
-            f"no scenario {text!r}; {hint}known are {', '.join(known)}"
+            f"no scenario {shown(text)}; {hint}known are {', '.join(known)}"
         )
     return path
 
