@@ -9,6 +9,7 @@ import json
 import os
 from pathlib import Path
 import re
+import signal
 import subprocess
 import sys
 
@@ -144,3 +145,31 @@ def test_a_reader_that_writes_or_takes_too_long_has_failed(
 
 def refuse(message: str) -> None:
     raise InputError(message)
+
+
+def test_a_process_that_ends_or_hangs_is_a_failure_and_the_next_goes_on(
+    monkeypatch,
+):
+    def write(folder, rng):
+        return folder / "mine.yaml", ""
+
+    def end(path):
+        os._exit(3)
+
+    def hang(path):
+        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])
+        while True:
+            pass
+
+    readers = (
+        Reader("ends", dict, write, end),
+        Reader("hangs", dict, write, hang),
+        Reader("well", dict, write, lambda path: None),
+    )
+    monkeypatch.setattr(input_corpus, "READERS", readers)
+    monkeypatch.setattr(input_corpus, "SHARES", (1, 1, 1))
+    monkeypatch.setattr(input_corpus, "LONGEST", 1.0)
+    found = {o.kind: o for o in input_corpus.try_inputs(3, 1)}
+    assert found["well"].end == "read"
+    assert found["ends"].told == "the process ended with 3"
+    assert "still busy" in found["hangs"].told

@@ -185,7 +185,7 @@ def _refuse_unknown(data: Any, schema: Any, where: str) -> None:
                 if near
                 else (f"known are {', '.join(fields)}")
             )
-            raise InputError(f"{where} has no field {key!r}; {hint}")
+            raise InputError(f"{where} has no field {shown(key)}; {hint}")
         _refuse_unknown(item, fields[key], f"{where}.{key}")
 
 
@@ -237,7 +237,7 @@ def _first_misfit(data: Any, schema: Any, where: str) -> str | None:
             for key, item in data.items():
                 kind = args[1] if not fields else fields.get(key)
                 if not fields and args[0] is str and not isinstance(key, str):
-                    return f"{where} has the key {key!r}, expected text"
+                    return f"{where} has the key {shown(key)}, expected text"
                 if kind is None:
                     continue
                 found = _first_misfit(item, kind, f"{where}.{key}")

@@ -468,7 +468,7 @@ def _join_group(
         or aspect > config.max_aspect
         or not _LEAST_SEEN <= seen < 1.1
         or covered < _LEAST_COVERED
-        or _beyond(ellipse, rim) > max(_BEYOND, _ROUGHER * math.sqrt(area))
+        or ellipse.beyond(rim) > max(_BEYOND, _ROUGHER * math.sqrt(area))
     ):
         return None
     for part in group:
@@ -479,20 +479,8 @@ def _join_group(
     size = min(1.0, area / (2.0 * config.min_area))
     u, v = ellipse.center
     confidence = size * min(1.0, seen) * min(1.0, covered + 0.1)
-    whole = Blob(float(u), float(v), area, confidence, _filled(ellipse))
+    whole = Blob(float(u), float(v), area, confidence, ellipse.filled_moments())
     return seen * covered, whole
-
-
-def _filled(ellipse: Ellipse) -> tuple[float, float, float]:
-    """Variances and covariance of the pixels of a whole marker.
-
-    Args:
-        ellipse: Through the pixels of its rim, half a pixel within the edge.
-    """
-    a, b = ellipse.axes
-    inner = np.linalg.inv(ellipse.shape) / 4.0
-    inner *= (a + 0.5) * (b + 0.5) / (a * b)
-    return float(inner[0, 0]), float(inner[0, 1]), float(inner[1, 1])
 
 
 def _complete(
@@ -526,7 +514,7 @@ def _complete(
     found = fit_arcs(part.rim)
     if found is None:
         return doubtful
-    ellipse, _ = found
+    ellipse, on_it = found
     size = ellipse.axes + 0.5
     seen = area / (math.pi * float(size[0] * size[1]))
     aspect = float(size[0] / size[1])
@@ -535,24 +523,19 @@ def _complete(
         not _LEAST_SEEN < seen < 1.1
         or aspect > config.max_aspect
         or shift > float(size[0])
-        or _beyond(ellipse, part.rim) > max(_BEYOND, _ROUGHER * math.sqrt(area))
+        or ellipse.beyond(part.rim) > max(_BEYOND, _ROUGHER * math.sqrt(area))
     ):
         return doubtful
     return Blob(
         float(ellipse.center[0]),
         float(ellipse.center[1]),
         area,
-        blob.confidence * min(1.0, seen),
-        _filled(ellipse),
+        # What is seen, and how much of its rim tells the ellipse.
+        min(1.0, area / (2.0 * config.min_area))
+        * min(1.0, seen)
+        * min(1.0, len(on_it) / len(part.rim) + 0.2),
+        ellipse.filled_moments(),
     )
-
-
-def _beyond(ellipse: Ellipse, rim: Array) -> float:
-    """How far a rim is outside of an ellipse, at most of it [pixels].
-
-    What hides the marker takes away, and adds nothing.
-    """
-    return float(np.quantile(ellipse.distance(rim), 0.97))
 
 
 def _has_company(part: _Part, parts: Sequence[_Part]) -> bool:

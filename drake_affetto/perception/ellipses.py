@@ -46,6 +46,23 @@ class Ellipse:
         )
         return np.linalg.norm(offset, axis=1) * (1.0 - 1.0 / r)
 
+    def filled_moments(self) -> tuple[float, float, float]:
+        """Variance along u, covariance, and variance along v of its pixels.
+
+        For an ellipse through the pixels of a rim, half a pixel within it.
+        """
+        a, b = self.axes
+        inner = np.linalg.inv(self.shape) / 4.0
+        inner *= (a + 0.5) * (b + 0.5) / (a * b)
+        return float(inner[0, 0]), float(inner[0, 1]), float(inner[1, 1])
+
+    def beyond(self, rim: Array) -> float:
+        """How far points (n, 2) of a rim are outside, at most of it [pixels].
+
+        What hides a marker takes away, and adds nothing.
+        """
+        return float(np.quantile(self.distance(rim), 0.97))
+
     def covered(self, points: Array) -> float:
         """Share of its rim, in sectors, at which there is one of points."""
         size, axes = np.linalg.eigh(self.shape)

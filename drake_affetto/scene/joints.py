@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
-from drake_affetto.common.errors import InputError, require
+from drake_affetto.common.errors import InputError, require, shown
 from drake_affetto.common.typing import Array
 
 
@@ -41,7 +41,7 @@ def find_joint(
             else f"known are {', '.join(known) or 'none'}"
         )
         model = plant.GetModelInstanceName(model_instance)
-        raise InputError(f"model {model} has no joint {name!r}; {hint}")
+        raise InputError(f"model {model} has no joint {shown(name)}; {hint}")
     return plant.GetJointByName(name, model_instance)
 
 

@@ -2,7 +2,8 @@
 
 Everything here reads names, limits and sizes from the parsed models; nothing
 is repeated in code. All functions that take a `context` want the plant's own
-context, i.e. `plant.GetMyContextFromRoot(root_context)`.
+context, i.e. `plant.GetMyContextFromRoot(root_context)`. Long: all that a scene
+has stands side by side.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

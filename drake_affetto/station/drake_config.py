@@ -91,7 +91,8 @@ def _ask_drake(ask: Any, config: Any, default: Any, where: str) -> None:
         ask(config)
         return
     except RuntimeError as error:
-        reason = " ".join(str(error).split())
+        # It may repeat a long value.
+        reason = " ".join(str(error).split())[:200]
     for field in type(config).__fields__:
         usual, value = getattr(default, field.name), getattr(config, field.name)
         setattr(default, field.name, value)

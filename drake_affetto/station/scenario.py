@@ -14,6 +14,7 @@ from drake_affetto.common.errors import (
     require,
     require_choice,
     require_range,
+    shown,
 )
 from drake_affetto.common.fields import file_name
 from drake_affetto.common.fingerprint import config_values
@@ -414,7 +415,7 @@ def find_scenario(name: str | Path) -> Path:
         near = difflib.get_close_matches(text, known, n=1)
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise InputError(
-            f"no scenario {text!r}; {hint}known are {', '.join(known)}"
+            f"no scenario {shown(text)}; {hint}known are {', '.join(known)}"
         )
     return path
 

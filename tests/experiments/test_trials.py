@@ -166,6 +166,9 @@ def test_a_living_process_does_not_keep_what_a_file_held_before(
         def __init__(self, scenario):
             built.append(scenario.settling_duration)
 
+        def place_mirror(self, pose):
+            assert pose is None
+
         def look(self, xy, seed):
             return GazeOutcome(True, np.zeros(2), built[-1])
 
@@ -220,6 +223,9 @@ def test_runners_can_be_handed_in():
     """For trials that are watched, for instance."""
 
     class Watched:
+        def place_mirror(self, pose):
+            assert pose is None
+
         def look(self, xy, seed):
             return GazeOutcome(True, np.array([0.25, seed]), 1.5)
 

@@ -14,6 +14,7 @@ import dataclasses
 import functools
 import json
 import math
+import multiprocessing
 from pathlib import Path
 import shutil
 import signal
@@ -654,19 +655,74 @@ def show(
     return "failed", f"`{' '.join(command(path, out))}`: {code}, {line[:300]}"
 
 
-def try_inputs(
+def plan_inputs(
     count: int, seed: int, wanted: Collection[str] = ()
-) -> Iterator[Outcome]:
-    """Tries `count` inputs, of the kinds that are wanted or of all."""
+) -> list[tuple[int, int]]:
+    """Which reader and which seed each input has, of the kinds wanted."""
     kinds = np.repeat(np.arange(len(READERS)), SHARES)
     kinds = np.array(
         [k for k in kinds if not wanted or READERS[k].kind in wanted]
     )
     np.random.default_rng(seed).shuffle(kinds)
+    return [
+        (int(kinds[i % len(kinds)]), seed * 1_000_000 + i) for i in range(count)
+    ]
+
+
+def _work(connection: Any, folder: Path) -> None:
+    """Tries the inputs that come through a connection, in a folder."""
+    while (task := connection.recv()) is not None:
+        number, seed = task
+        connection.send(try_input(READERS[number], seed, folder))
+
+
+def try_inputs(
+    count: int, seed: int, wanted: Collection[str] = ()
+) -> Iterator[Outcome]:
+    """Tries `count` inputs, of the kinds that are wanted or of all.
+
+    They are read in a process of their own, for a library that reads damaged
+    bytes may end it, or never come back: then the next one goes on.
+    """
     with tempfile.TemporaryDirectory() as folder:
-        for i in range(count):
-            reader = READERS[kinds[i % len(kinds)]]
-            yield try_input(reader, seed * 1_000_000 + i, Path(folder) / "one")
+        yield from _try_inputs(
+            plan_inputs(count, seed, wanted), Path(folder) / "one"
+        )
+
+
+def _try_inputs(
+    tasks: list[tuple[int, int]], folder: Path
+) -> Iterator[Outcome]:
+    # Not a fork of a process with threads: this one has none.
+    fork = multiprocessing.get_context("fork")
+    worker: Any = None
+    for task in tasks:
+        if worker is None:
+            mine, theirs = fork.Pipe()
+            worker = fork.Process(
+                target=_work, args=(theirs, folder), daemon=True
+            )
+            worker.start()
+            theirs.close()
+        start = time.monotonic()
+        mine.send(task)
+        told = "the process is still busy and was killed"
+        if mine.poll(LONGEST + 2.0):
+            try:
+                yield mine.recv()
+                continue
+            except EOFError:
+                worker.join()
+                told = f"the process ended with {worker.exitcode}"
+        worker.kill()
+        worker.join()
+        worker = None
+        number, one = task
+        seconds = time.monotonic() - start
+        yield Outcome(READERS[number].kind, one, "", "failed", told, seconds)
+    if worker is not None:
+        mine.send(None)
+        worker.join()
 
 
 def main() -> int:
