@@ -352,7 +352,16 @@ def _make_results(
         map=example,
         chance=success_rate(_successes(_table(plan, outcomes, _BLIND, 0))),
         bodies=robots.numbers(),
+        knowledge=_knowledge(plan),
     )
+
+
+def _knowledge(plan: MirrorPlan) -> dict[str, float]:
+    """How wrongly the default's map knows the camera, if it knows one."""
+    transfer = load_scenario(plan.scenario).transfer
+    if transfer.mapping != "optical":
+        return {}
+    return dataclasses.asdict(transfer.errors)
 
 
 def _table(

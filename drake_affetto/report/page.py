@@ -17,6 +17,7 @@ from drake_affetto.report.parts import (
 )
 from drake_affetto.report.report_data import ReportData, collect
 from drake_affetto.report.sections import (
+    bodies,
     conditions,
     drumming,
     media,
@@ -41,6 +42,7 @@ _SECTIONS: tuple[Callable[[ReportData], Section | None], ...] = (
     transfer.make,
     self_calibration.make,
     scenarios.make,
+    bodies.make,
     conditions.make,
     toy.make,
     tuning.make,

@@ -20,6 +20,9 @@ from drake_affetto.tuning.results import TuningResults
 # The kinds of study that the page shows.
 STUDIES = (*STUDY_RESULTS, "tune")
 
+# What studies of many bodies are called among the others.
+_BODIES = {"mirror": "bodies", "drum": "drum_bodies"}
+
 # What a study's folder can hold beside its numbers, and what kind it is of.
 MEDIA = {
     "replay.html": "text/html",
@@ -38,7 +41,8 @@ class StudyFolder:
 
     Attributes:
         folder: The folder.
-        study: Kind of study, one of `STUDIES`.
+        study: Kind of study, one of `STUDIES`, or "bodies" and "drum_bodies"
+            for those with a body a repeat.
         results: Content of its results.json.
         media: Its pictures, sounds and replay, by file name.
     """
@@ -78,6 +82,9 @@ def read_folder(folder: Path) -> StudyFolder:
             f"{path} was made by version {version[:40]}, this is {__version__}:"
             f" run the study again, or `affetto report` of that version"
         )
+    if getattr(found, "bodies", None):
+        # It stands on the page beside the study of one robot.
+        study = _BODIES[study]
     media = {name: folder / name for name in MEDIA if (folder / name).is_file()}
     return StudyFolder(folder, study, found, media)
 

@@ -19,7 +19,7 @@ def test_comparisons_are_read_in_both_directions():
     assert there.p == back.p
     chart = significance(found, 3)
     z = np.array(chart.figure.data[0].z, dtype=float)
-    np.testing.assert_allclose(z + z.T, np.where(np.eye(6), np.nan, 0.0))
+    np.testing.assert_allclose(z + z.T, np.where(np.eye(8), np.nan, 0.0))
     row = wording.ordered(found.rates).index("transfer")
     assert z[row, 0] == pytest.approx(100 * there.difference, abs=0.06)
 

@@ -78,7 +78,7 @@ def test_scenarios_serve_for_the_mirror_too(tmp_path):
     assert "and another scheme in 1 of 5 views: camera rolled" in made.text
     assert (
         "ahead of both transfers in 2 of 5 views: mirror moved (relearning "
-        "from scratch) and robot moved (the unchanged skill)" in made.text
+        "from scratch) and head turned (the unchanged skill)" in made.text
     )
 
 

@@ -210,6 +210,8 @@ def _mirror_body(scenario, rates, seed, samples, repeats, evaluations):
                 "success_rate": rate(per_repeat),
                 "per_repeat": per_repeat.tolist(),
                 "rewards": [_reward(rng, s) for s in hits.ravel()],
+                "landing": [0.01 if s else 0.09 for s in hits.ravel()],
+                "grazes": 0.05,
             }
     comparisons = []
     for n in samples:
@@ -232,6 +234,19 @@ def _mirror_body(scenario, rates, seed, samples, repeats, evaluations):
                         "effect_size": 3.0 * difference,
                     }
                 )
+        if {"transfer_default", "relearn"} <= rates.keys():
+            comparisons.append(
+                {
+                    "a": "transfer_default",
+                    "b": "relearn",
+                    "samples": n,
+                    "difference": -0.021,
+                    "p": 0.002,
+                    "p_corrected": 0.012,
+                    "measure": "landing",
+                    "primary": n == 3,
+                }
+            )
     axis = np.linspace(0.0, 1.0, 11)
     grid = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
     taught = rng.uniform(0.1, 0.9, (5, 2))
@@ -252,6 +267,14 @@ def _mirror_body(scenario, rates, seed, samples, repeats, evaluations):
         "workspace": 1.0,
         "schemes": schemes,
         "comparisons": comparisons,
+        "chance": {"mean": 0.17, "low": 0.1, "high": 0.27},
+        "knowledge": {
+            "angle": 0.0175,
+            "position": 0.005,
+            "focal": 0.01,
+            "height": 0.003,
+            "neck": 0.0,
+        },
         "map": {
             "scheme": "transfer_default",
             "samples": max(samples),
@@ -272,6 +295,19 @@ def mirror(
     return _mirror_body(
         "mirror", WINNERS[winner], seed, samples, repeats, evaluations
     )
+
+
+def bodies(seed=0):
+    """Twelve robots; the heavier its elbow, the less one hits."""
+    results = mirror("transfer", seed, samples=(3,), repeats=12)
+    mass = np.linspace(0.8, 1.2, 12)
+    results["bodies"] = [
+        {"mass.right_elbow": float(m), "supply": 1.0 + 0.01 * (i % 3)}
+        for i, m in enumerate(mass)
+    ]
+    cell = results["schemes"]["transfer_default"]["3"]
+    cell["per_repeat"] = np.linspace(1.0, 0.8, 12).round(3).tolist()
+    return results
 
 
 def scenarios(seed=0):

@@ -132,6 +132,8 @@ class MirrorResults(StudyResults):
         chance: Success of the best constant stroke, played blind.
         bodies: How each repeat's robot departs from its model, by name of the
             number; empty where all are alike.
+        knowledge: How wrongly the optical map knows the camera, see
+            `CalibrationError`; empty where the default's map is another one.
         self_calibration: How the robot finds the mirror by itself; None if it
             was not tried.
     """
@@ -151,6 +153,7 @@ class MirrorResults(StudyResults):
     map: TransferMap | None = None
     chance: SuccessRate | None = None
     bodies: list[dict[str, float]] = field(default_factory=list)
+    knowledge: dict[str, float] = field(default_factory=dict)
     self_calibration: SelfCalibrationResults | None = None
 
     def check(self, where: str) -> None:

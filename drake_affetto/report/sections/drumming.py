@@ -9,6 +9,7 @@ from drake_affetto.report import wording
 from drake_affetto.report.charts import drumming as charts
 from drake_affetto.report.parts import Section, Statement, in_pairs
 from drake_affetto.report.report_data import Drumming, ReportData
+from drake_affetto.report.sections import transfer_evidence as evidence
 from drake_affetto.sound.reward import SUCCESS_THRESHOLD
 
 
@@ -62,10 +63,11 @@ def make(data: ReportData) -> Section | None:
 
 
 def _sentences(drumming: Drumming, results: DrumResults | None) -> str:
-    parts = [_hits(drumming), *_teaching(drumming)]
+    parts = [_hits(drumming), *_misses(drumming), *_teaching(drumming)]
     if results:
         parts += [*_orders(results), _reward(results.separation)]
-    return " ".join(wording.sentence(part) for part in parts)
+        parts.append(evidence.chance_sentence(results.chance).rstrip("."))
+    return " ".join(wording.sentence(part) for part in parts if part)
 
 
 def _hits(drumming: Drumming) -> str:
@@ -79,6 +81,22 @@ def _hits(drumming: Drumming) -> str:
             f"{drumming.per_repeat} positions)"
         )
     return text
+
+
+def _misses(drumming: Drumming) -> list[str]:
+    """At which places the drum was missed, and how often."""
+    missed: dict[tuple[float, float], int] = {}
+    for test in drumming.tests:
+        if not test.success:
+            place = (round(test.xy[0], 3), round(test.xy[1], 3))
+            missed[place] = missed.get(place, 0) + 1
+    if not missed:
+        return []
+    named = [
+        f"({100 * x:.1f}, {100 * y:.1f}) cm {wording.number(count, 'time')}"
+        for (x, y), count in sorted(missed.items(), key=lambda item: -item[1])
+    ]
+    return [f"the drum was missed at {wording.joined(named[:8])}"]
 
 
 def _teaching(drumming: Drumming) -> list[str]:

@@ -10,6 +10,8 @@ _STUDIES = {
     "demo": "the whole story once, at small scale",
     "drum": "success over the number of demonstrations",
     "mirror": "the schemes in one changed view, with statistics",
+    "bodies": "the schemes on robots of other bodies",
+    "drum_bodies": "learning to drum on robots of other bodies",
     "scenarios": "the schemes in all changed views",
     "conditions": "when transfer wins",
     "toy": "the paper's toy experiment",

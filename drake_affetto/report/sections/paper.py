@@ -77,8 +77,8 @@ def _order_rows(data: ReportData) -> list[list[str]]:
             [
                 f"order with {wording.number(n, 'new demonstration')} "
                 f"({wording.scenario(comparison.scenario)})",
-                "transfer > continued, relearned > unchanged (3 to 5 "
-                "demonstrations)",
+                "transfer > relearned; continued and unchanged do not adapt "
+                "(3 to 5 demonstrations)",
                 f"{order}: {', '.join(rates)}",
             ]
         )

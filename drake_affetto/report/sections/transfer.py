@@ -7,6 +7,7 @@ from drake_affetto.report.charts import transfer as charts
 from drake_affetto.report.comparison import SchemeComparison
 from drake_affetto.report.parts import Section, Statement, in_pairs
 from drake_affetto.report.report_data import ReportData
+from drake_affetto.report.sections import transfer_evidence as evidence
 from drake_affetto.report.style import DARK, LIGHT, scheme_color
 from drake_affetto.report.wording import conclude
 
@@ -32,6 +33,24 @@ def make(data: ReportData) -> Section | None:
         scheme = wording.in_text(comparison.map.scheme)
         count = wording.number(comparison.map.samples, "demonstration")
     conclusions = [conclude(comparison, n) for n in comparison.samples]
+    statements = [
+        Statement(each.winner, each.head, each.text) for each in conclusions
+    ]
+    results = data.results("mirror")
+    tables = []
+    chance = ""
+    if results is not None and comparison.scenario == results.scenario:
+        chance = evidence.chance_sentence(results.chance)
+        known = evidence.knowledge_statement(results)
+        statements += [known] if known is not None else []
+        tables = [
+            table
+            for table in (
+                evidence.primary_table(results),
+                evidence.landing_table(results),
+            )
+            if table is not None
+        ]
     return Section(
         "mirror",
         "Through the mirror" if in_mirror else "Seen otherwise",
@@ -40,10 +59,9 @@ def make(data: ReportData) -> Section | None:
         {
             "in_mirror": in_mirror,
             "scenario": wording.scenario(comparison.scenario),
-            "statements": [
-                Statement(each.winner, each.head, each.text)
-                for each in conclusions
-            ],
+            "statements": statements,
+            "chance": chance,
+            "tables": tables,
             "untested": not comparison.tested and comparison.trials > 0,
             "trials": comparison.trials,
             "trials_text": wording.number(comparison.trials, "trial"),
