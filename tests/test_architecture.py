@@ -415,6 +415,7 @@ TESTED_IN = {
 # Further tests of a module, which need something else: a browser, rendered
 # images, the files of the models.
 MORE_TESTS = {
+    "experiments/test_protocol.py": "experiments/mirror",
     "experiments/test_workspace_images.py": "experiments/workspace",
     "report/test_browser.py": "report/page",
     "report/test_self_calibration.py": "report/page",

@@ -75,7 +75,7 @@ def landing_table(results: MirrorResults) -> Table | None:
         ("scheme", *(f"{n} samples" for n in results.samples)),
         rows,
         "Where the palm comes down, from the middle of the head (median; its "
-        "radius is 40 mm, that of the hand 28). Success saturates, this does "
+        "radius is 37 mm, that of the hand 28). Success saturates, this does "
         "not. A graze sounds the head although the palm comes down beside "
         "it; by its sound it counts as a hit.",
         free=True,
