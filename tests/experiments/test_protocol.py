@@ -162,7 +162,8 @@ def test_the_head_that_is_struck_is_the_one_that_sounds(runner):
     radius = world.head_radius(plant, runner._sub(plant))
     assert radius == pytest.approx(0.0369, abs=5e-4)
     sound = load_sound_config(runner.scenario.sound)
-    assert sound.voice.head.radius == pytest.approx(radius, rel=0.02)
+    # The hoop covers the membrane's border.
+    assert radius < sound.voice.membrane.radius < 1.1 * radius
 
 
 def test_the_chain_has_the_latencies_that_its_models_say(runner):
