@@ -105,3 +105,16 @@ def test_compare_has_every_pair_once():
     assert rows[2].difference == 0.0
     assert rows[2].p_corrected == 1.0
     assert {r.samples for r in rows} == {3}
+
+
+@pytest.mark.parametrize("outcome", [0.0, 1.0])
+def test_trials_of_a_repeat_belong_together_also_where_all_went_alike(outcome):
+    together = success_rate(np.full((10, 8), outcome))
+    alone = success_rate(np.full((80, 1), outcome))
+    width, narrow = (r.high - r.low for r in (together, alone))
+    assert together.mean == alone.mean == outcome
+    assert 1.3 * narrow < width
+    # Not as little as if each repeat were a single trial.
+    assert width < success_rate(np.full((10, 1), outcome)).high - (
+        success_rate(np.full((10, 1), outcome)).low
+    )
