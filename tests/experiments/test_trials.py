@@ -141,6 +141,9 @@ def test_runners_can_be_handed_in():
     """For trials that are watched, for instance."""
 
     class Watched:
+        def place_mirror(self, pose):
+            assert pose is None
+
         def look(self, xy, seed):
             return GazeOutcome(True, np.array([0.25, seed]), 1.5)
 
