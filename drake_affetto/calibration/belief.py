@@ -15,7 +15,7 @@ from scipy.special import expit
 from drake_affetto.calibration.config import EarConfig
 from drake_affetto.calibration.knowledge import RobotKnowledge
 from drake_affetto.calibration.plane import PlaneEstimate, PlanePrior
-from drake_affetto.common.typing import Array
+from drake_affetto.common.typing import Array, Mask
 from drake_affetto.geometry.region import grid_inside, inside_polygon
 
 # Points along the workspace's box where a stroke may be aimed.
@@ -121,11 +121,20 @@ class PlaneBelief:
         pixel = self.knowledge.calibration.pixels(np.asarray(tau))
         return self.knowledge.places(self.planes, self._reference, pixel)
 
-    def see(self, tau: Array) -> None:
-        """Takes in that a drum is seen at τ̂ (2,): it is in the workspace."""
+    def plausible(self, tau: Array) -> float:
+        """Probability that the drum seen at τ̂ (2,) is in the workspace."""
+        return float(self.weights @ self._inside(tau))
+
+    def _inside(self, tau: Array) -> Mask:
+        """By which planes (N,) a drum seen at τ̂ (2,) is in the workspace."""
         places = self.places(tau)
         inside = np.isfinite(places[:, 0])
         inside[inside] = inside_polygon(self._wide, places[inside])
+        return inside
+
+    def see(self, tau: Array) -> None:
+        """Takes in that a drum is seen at τ̂ (2,): it is in the workspace."""
+        inside = self._inside(tau)
         self._weigh(np.where(inside, 1.0, self._config.stray))
 
     def choose(self, tau: Array, explore: float | None = None) -> Stroke:

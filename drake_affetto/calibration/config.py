@@ -81,13 +81,18 @@ class EllipseConfig:
     """How the drum's marker is measured in the mirror.
 
     Attributes:
-        moment_sd: Noise of the square root of its second moments, px.
+        moment_sd: Noise of the shape's features, lengths like the square root
+            of its second moments, px.
+        bias: Error of the features that all images share, u, slope and v, px.
+        bias_sd: How exactly that is known, px.
         blur: Standard deviation of the image's own blur, px.
         places: Number of the drum's places that are looked at.
         fewest: Least number of them.
     """
 
     moment_sd: float = number(0.04, 1e-4, 100.0)
+    bias: list[float] = dataclasses.field(default_factory=lambda: [0.0] * 3)
+    bias_sd: float = number(0.02, 1e-4, 100.0)
     blur: float = number(0.289, 0.0, 10.0)
     places: int = number(8, 1, 1000)
     fewest: int = number(3, 1, 1000)
@@ -95,6 +100,7 @@ class EllipseConfig:
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that does not fit."""
         check_ranges(self, where)
+        require_vector(f"{where}.bias", self.bias, 3, -10, 10)
 
 
 @dataclasses.dataclass
@@ -138,12 +144,17 @@ class WatchConfig:
         hit_when_right: Share of strokes that are heard while it is right; the
             stroke's own chance is taken where it is less.
         hit_when_wrong: Share of strokes that are heard while it is wrong.
+        strange_when_right: Share of drums that are seen where none can stand,
+            while it is right.
+        strange_when_wrong: The same while it is wrong.
         threshold: Sum of log likelihood ratios at which it is noticed.
     """
 
     hit_when_right: float = number(0.95, 0.5, 0.9999)
-    hit_when_wrong: float = number(0.25, 0.0001, 0.9)
-    threshold: float = number(6.0, 0.1, 100.0)
+    hit_when_wrong: float = number(0.3, 0.0001, 0.9)
+    strange_when_right: float = number(0.02, 1e-6, 0.5)
+    strange_when_wrong: float = number(0.3, 1e-6, 0.99)
+    threshold: float = number(5.0, 0.1, 100.0)
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that does not fit."""
@@ -153,6 +164,12 @@ class WatchConfig:
             self.hit_when_wrong,
             0.0,
             self.hit_when_right,
+        )
+        require_range(
+            f"{where}.strange_when_right",
+            self.strange_when_right,
+            0.0,
+            self.strange_when_wrong,
         )
 
 

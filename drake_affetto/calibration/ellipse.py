@@ -178,7 +178,7 @@ def estimate_from_ellipses(
 
     def robot_of(x: Array) -> RobotKnowledge:
         correction = np.zeros(knowledge.corrections)
-        correction[sought] = x[3:] * deviation[sought]
+        correction[sought] = x[6:] * deviation[sought]
         return knowledge.corrected(correction)
 
     def residuals(x: Array) -> Array:
@@ -189,6 +189,7 @@ def estimate_from_ellipses(
         )
         # A marker behind the camera is no small ellipse.
         expected = shape_features(np.nan_to_num(moments, nan=0.0))
+        expected = expected + config.bias + config.bias_sd * x[3:6]
         return np.concatenate(
             [
                 ((expected - shape) / config.moment_sd).ravel(),
@@ -198,9 +199,10 @@ def estimate_from_ellipses(
         )
 
     drawn = prior.draw(_DRAWN, np.random.default_rng(0))
-    starts = np.column_stack([drawn, np.zeros((_DRAWN, len(sought)))])
+    # The plane, the images' common error, and the camera's correction.
+    starts = np.column_stack([drawn, np.zeros((_DRAWN, 3 + len(sought)))])
     costs = [np.sum(np.minimum(residuals(x) ** 2, _GROSS)) for x in starts]
-    scale = np.concatenate([_SCALE, np.ones(len(sought))])
+    scale = np.concatenate([_SCALE, np.ones(3 + len(sought))])
     fits = [
         least_squares(residuals, starts[i], loss="soft_l1", x_scale=scale)
         for i in np.argsort(costs)[:_STARTS]

@@ -8,14 +8,26 @@ from drake_affetto.calibration.config import WatchConfig
 class StrokeWatch:
     """Strokes that should be heard and are not, counted up (Page 1954).
 
-    Each stroke adds the log of how much likelier its outcome is if the mirror
-    has moved; the sum never falls below zero. Once it reaches the threshold,
-    the belief is taken to be wrong.
+    So are drums that are seen where none can stand. Each adds the log of how
+    much likelier it is if the mirror has moved; the sum never falls below
+    zero. Once it reaches the threshold, the belief is taken to be wrong.
     """
 
     def __init__(self, config: WatchConfig) -> None:
         self._config = config
         self.sum = 0.0
+
+    def see(self, plausible: bool) -> bool:
+        """Takes in where a drum is seen; whether the belief is wrong now.
+
+        Args:
+            plausible: Whether a drum can stand there, as believed.
+        """
+        right = self._config.strange_when_right
+        wrong = self._config.strange_when_wrong
+        if plausible:
+            return self._step(math.log((1.0 - wrong) / (1.0 - right)))
+        return self._step(math.log(wrong / right))
 
     def add(self, chance: float, heard: bool) -> bool:
         """Takes in a stroke; whether the belief is taken to be wrong now.
@@ -28,10 +40,11 @@ class StrokeWatch:
         # A stroke of which little was expected does not speak against it.
         wrong = min(self._config.hit_when_wrong, right)
         if heard:
-            step = math.log(wrong / right)
-        else:
-            step = math.log((1.0 - wrong) / (1.0 - right))
-        self.sum = max(0.0, self.sum + step)
+            return self._step(math.log(wrong / right))
+        return self._step(math.log((1.0 - wrong) / (1.0 - right)))
+
+    def _step(self, log_ratio: float) -> bool:
+        self.sum = max(0.0, self.sum + log_ratio)
         return self.sum >= self._config.threshold
 
     def reset(self) -> None:

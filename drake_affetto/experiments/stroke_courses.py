@@ -36,6 +36,8 @@ LATE = {"ellipse": (7, 12), "prior": (13, 24)}
 # A turned mirror should be noticed within so many strokes; after so many more
 # it is given up; and so many show whether the robot found it again.
 _IN_TIME, _GIVEN_UP, _AFTER = 6, 10, 4
+# Drums that are in the workspace with less probability are strange.
+_STRANGE = 0.05
 # After these strokes the first repeat's belief is kept for the picture.
 _SHOWN = (0, 1, 2, 4, 6, 9, 12, 18, 24)
 # Planes in a picture of a belief.
@@ -231,10 +233,7 @@ def watch(
             )
             for i in going
         }
-        chances, heard = _watched_strokes(study, going, drums, k)
-        for i in list(going):
-            if not going[i][1].add(chances[i], heard[i]):
-                continue
+        for i in _watched_strokes(study, going, drums, k):
             if is_turned:
                 delays[i] = k + 1 - plan.turned_after
                 del going[i]
@@ -261,11 +260,11 @@ def _watched_strokes(
     going: Mapping[int, tuple[PlaneBelief, StrokeWatch]],
     drums: Mapping[int, tuple[FramePose, Any, int]],
     k: int,
-) -> tuple[dict[int, float], dict[int, bool]]:
-    """What is expected of a stroke in each repeat, and whether it is heard.
+) -> list[int]:
+    """One stroke in each repeat; those in which the robot raises alarm.
 
-    A drum that is not found is not struck; as it should have been seen, that
-    counts as a stroke that was not heard.
+    A drum that is not found is not struck, but is as strange as one that is
+    seen where none can stand.
     """
     gazes = study.look_at(f"Looking, watched, {k + 1}", drums)
     strokes = {
@@ -280,11 +279,16 @@ def _watched_strokes(
             for i, stroke in strokes.items()
         },
     )
-    expected = study.settings.watch.hit_when_right
-    return (
-        {i: strokes[i].chance if i in strokes else expected for i in gazes},
-        {i: sounded(struck.get(i)) for i in gazes},
-    )
+    alarms = []
+    for i, gaze in gazes.items():
+        belief, observer = going[i]
+        seen = gaze.found and belief.plausible(np.array(gaze.tau)) > _STRANGE
+        alarm = observer.see(seen)
+        if i in strokes:
+            alarm |= observer.add(strokes[i].chance, sounded(struck[i]))
+        if alarm:
+            alarms.append(i)
+    return alarms
 
 
 def _recovered(study: SelfCalibration, mirrors: Mapping[int, FramePose]) -> Any:

@@ -63,6 +63,15 @@ def test_who_knows_the_mirror_aims_at_the_drum():
         np.testing.assert_allclose(stroke.tau, expected[0])
 
 
+def test_drums_that_cannot_be_there_are_told():
+    belief = around(MIRROR)
+    good = tau_of(TRUE, MIRROR, np.array([0.25, -0.1]))
+    assert belief.plausible(good) == 1.0
+    # The mirror has been turned since.
+    other = tau_of(TRUE, MIRROR + [0.35, 0.0, 0.0], np.array([0.25, 0.0]))
+    assert belief.plausible(other) < 0.05
+
+
 def test_strokes_are_aimed_within_the_workspace():
     belief = from_prior()
     for xy in spread_inside(WORKSPACE, 5, np.random.default_rng(2)):

@@ -41,3 +41,26 @@ def test_false_alarms_are_rare_and_turns_are_noticed():
     assert alarms <= strokes / 200
     delays = [run(6 * [0.92], rng.random(6) < 0.15) for _ in range(500)]
     assert np.mean([delay is not None for delay in delays]) >= 0.9
+
+
+def test_drums_where_none_can_stand_are_noticed():
+    watch = StrokeWatch(WatchConfig())
+    assert not watch.see(False)
+    assert watch.see(False)
+    watch.reset()
+    for _ in range(50):
+        assert not watch.see(True)
+    assert watch.sum == 0.0
+
+
+def test_what_is_seen_and_heard_raises_few_false_alarms():
+    rng = np.random.default_rng(1)
+    strokes, alarms = 20_000, 0
+    watch = StrokeWatch(WatchConfig())
+    for seen, heard in rng.random((strokes, 2)) < (0.98, 0.93):
+        alarm = watch.see(bool(seen))
+        alarm |= watch.add(0.92, bool(heard))
+        if alarm:
+            alarms += 1
+            watch.reset()
+    assert alarms <= strokes / 200

@@ -62,10 +62,12 @@ def test_a_turned_mirror_is_noticed_and_found_again(made):
 
 
 def test_a_mirror_that_stays_raises_no_alarm():
-    made = study(FakeMirrors(), dataclasses.replace(PLAN, turned_by=0.0))
+    made = study(
+        FakeMirrors(), dataclasses.replace(PLAN, turned_by=0.0, repeats=1)
+    )
     mirrors = {each.number: each.mirror for each in made.repeats}
     result = watch(made, made.by_hand(mirrors))
-    assert result.delays == [None, None]
+    assert result.delays == [None]
     assert result.noticed.mean == 0.0
     assert result.recovered is None
 
