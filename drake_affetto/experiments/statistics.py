@@ -133,9 +133,13 @@ def compare_landing(
         pair: The two schemes.
         samples: Number of samples that they were given, for the record.
     """
-    first, second = (np.nanmedian(landings[name], axis=1) for name in pair)
-    known = np.isfinite(first) & np.isfinite(second)
-    first, second = first[known], second[known]
+    # Repeats in which both have struck somewhere.
+    known = np.logical_and(
+        *(np.isfinite(landings[name]).any(axis=1) for name in pair)
+    )
+    first, second = (
+        np.nanmedian(landings[name][known], axis=1) for name in pair
+    )
     return SchemeComparisonRow(
         a=pair[0],
         b=pair[1],

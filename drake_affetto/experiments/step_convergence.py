@@ -124,7 +124,7 @@ def _outcome(
     trials: TrialRunner, recording: Recording, reward: float
 ) -> StepOutcome:
     n = trials.station.num_joints
-    error = (recording.joint_state - recording.desired_state)[:, :n]
+    error = (recording.true_state - recording.desired_state)[:, :n]
     held = recording.joint_t > recording.joint_t[-1] - _HELD
     return StepOutcome(
         reward=reward,
@@ -145,7 +145,7 @@ def _arrival(trials: TrialRunner, recording: Recording) -> Arrival | None:
     time = float(np.interp(_ARRIVED, force[around], recording.t[around]))
     state = [
         np.interp(time, recording.joint_t, each)
-        for each in recording.joint_state.T
+        for each in recording.true_state.T
     ]
     (palm,) = trials.palm_path(np.array([state]))
     return Arrival(time, palm[:2].tolist())

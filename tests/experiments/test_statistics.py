@@ -1,6 +1,7 @@
 """Intervals and tests, against scipy and against their promises."""
 
 import itertools
+import warnings
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from drake_affetto.common.errors import InputError
 from drake_affetto.experiments.statistics import (
     cohens_h,
     compare,
+    compare_landing,
     holm,
     paired_p,
     success_rate,
@@ -118,3 +120,19 @@ def test_trials_of_a_repeat_belong_together_also_where_all_went_alike(outcome):
     assert width < success_rate(np.full((10, 1), outcome)).high - (
         success_rate(np.full((10, 1), outcome)).low
     )
+
+
+def test_a_repeat_without_a_stroke_has_no_landing():
+    nothing = np.full((1, 4), np.nan)
+    near, far = (np.full((3, 4), d) for d in (0.01, 0.04))
+    landings = {
+        "near": np.vstack([near, nothing]),
+        "far": np.vstack([nothing, far]),
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        row = compare_landing(landings, ("near", "far"), 3)
+        # Only two repeats have both.
+        assert row.difference == pytest.approx(-0.03)
+        none = {"near": nothing, "far": nothing}
+        assert compare_landing(none, ("near", "far"), 3).p is None
