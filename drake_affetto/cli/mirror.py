@@ -132,7 +132,7 @@ class MirrorCommand(StudyCommand[MirrorPlan]):
             results = {name: each.results for name, each in found.items()}
             return ScenariosResults.of(plan, scenarios=results)
         outcome = found[plan.scenario]
-        if not call.args.no_media:
+        if not call.args.no_media and "transfer_default" in plan.schemes:
             call.console.print("Recording a direct and a mirrored trial ...")
             _record(call.out, outcome, plan)
         return outcome.results

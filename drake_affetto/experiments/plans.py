@@ -122,7 +122,9 @@ class MirrorPlan(Plan):
         25, 3, 1000, "number of demonstrations in direct view"
     )
     pool: int | None = None
-    schemes: tuple[str, ...] = SCHEMES
+    schemes: tuple[str, ...] = option(
+        SCHEMES, "schemes that are compared", metavar="SCHEME"
+    )
     choice: str = "random"
     variability: float = number(1.0, 0.0, 10.0)
     workspace: float = number(1.0, 0.05, 1.0)
@@ -144,6 +146,14 @@ class MirrorPlan(Plan):
             list(self.samples),
             "numbers of samples, each once",
         )
+        require(
+            len(set(self.schemes)) == len(self.schemes) > 0,
+            "--schemes",
+            list(self.schemes),
+            "schemes, each once",
+        )
+        for scheme in self.schemes:
+            require_choice("--schemes", scheme, *SCHEMES)
         require_range("pool", self.pool_size, max(self.samples), 1000)
         require_choice("choice", self.choice, "random", "spread")
 

@@ -40,3 +40,22 @@ def test_both_parts_learn_the_same_skill_from_the_same_demonstrations():
     assert plan.mirror.demonstrations == plan.drum.demonstrations
     assert plan.mirror.direct == plan.drum.scenario
     assert plan.mirror.seed == plan.drum.seed == 7
+
+
+@pytest.mark.parametrize(
+    ("schemes", "message"),
+    [
+        (("nonsense",), "--schemes is 'nonsense', expected 'unchanged' or"),
+        (("relearn", "relearn"), "each once"),
+        ((), "each once"),
+    ],
+)
+def test_schemes_are_known_and_named_once(schemes, message):
+    with pytest.raises(InputError, match=message):
+        MirrorPlan(schemes=schemes).check()
+
+
+def test_bodies_take_the_place_of_repeats():
+    assert MirrorPlan(bodies=3).repeats == 3
+    assert DrumPlan(bodies=2, repeats=9).repeats == 2
+    assert MirrorPlan().bodies == 0
