@@ -17,6 +17,8 @@ METHODS = {
     "ellipse": "the marker's ellipse",
     "ear": "hit or miss by ear",
 }
+# Symbols of the methods, other than those of schemes.
+_SYMBOLS = ("star", "hexagon", "pentagon")
 # Colors of the beliefs in a picture, from the first to the last.
 _COLORS = ("grid", "pale_plus", "transfer", "hit", "plus")
 # Beliefs by ear that are drawn, by the number of strokes.
@@ -41,7 +43,11 @@ def demonstrations_needed(
                 y=[100 * rate.mean],
                 error_y=style.whiskers([rate]),
                 mode="markers",
-                marker={"size": 11, "color": style.LIGHT[_COLORS[2 + k]]},
+                marker={
+                    "size": 11,
+                    "symbol": _SYMBOLS[k % len(_SYMBOLS)],
+                    "color": style.LIGHT[_COLORS[2 + k]],
+                },
                 hovertemplate=f"%{{y:.0f}} %<extra>{label}</extra>",
             )
         )
