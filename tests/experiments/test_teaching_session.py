@@ -6,6 +6,7 @@ import pytest
 from drake_affetto.common.errors import InputError
 from drake_affetto.experiments.plans import TeachPlan
 from drake_affetto.experiments.teaching_session import TeachingSession
+from drake_affetto.scene.world import ACTIVE_JOINTS
 from drake_affetto.teaching.demonstrations import (
     Demonstration,
     append_demonstration,
@@ -23,8 +24,9 @@ def test_files_of_others_are_refused(tmp_path, monkeypatch):
         path.unlink(missing_ok=True)
         values = {
             "t": [0.0, 1.0],
-            "q": np.zeros((2, 1)),
-            "joint_names": ["waist_yaw"],
+            "q": np.zeros((2, len(ACTIVE_JOINTS))),
+            "joint_names": list(ACTIVE_JOINTS),
+            "theta": np.zeros(15 * len(ACTIVE_JOINTS)),
             "drum_xy": [0.2, -0.1],
             "scenario": "drumming",
             "seed": 0,

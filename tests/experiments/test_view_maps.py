@@ -95,7 +95,8 @@ def test_each_view_is_a_change_and_affine_or_clearly_not(
     assert np.mean(~(beside < 0.045)) > 0.5
     best = view_maps.fit_affine(true.target, true.source)
     worst = true.distance(best.predict(true.target)).max()
-    assert worst < 0.005 if affine else worst > 0.04
+    # A stroke's own scatter is 1 cm.
+    assert worst < 0.01 if affine else worst > 0.04
 
 
 def test_places_are_those_of_the_drum(reference):
