@@ -27,6 +27,8 @@ def test_files_of_others_are_refused(tmp_path, monkeypatch):
             "q": np.zeros((2, len(ACTIVE_JOINTS))),
             "joint_names": list(ACTIVE_JOINTS),
             "theta": np.zeros(15 * len(ACTIVE_JOINTS)),
+            "task_parameter": [0.5, 0.0],
+            "prototype": np.zeros((2, 3)),
             "drum_xy": [0.2, -0.1],
             "scenario": "drumming",
             "seed": 0,
