@@ -13,6 +13,7 @@ from drake_affetto.experiments.results.trial import (
     EllipseLookResult,
     HandLookResult,
 )
+from drake_affetto.motion.minimum_jerk import minimum_jerk
 from drake_affetto.perception.blob import Blob, BlobConfig, detect
 
 # When the arm has come to the posture of a look, and when it leaves it, as
@@ -38,14 +39,10 @@ def way_to(
         Times (T,), s, and angles (T, n), rad.
     """
     part = np.linspace(0.0, 1.0, _POINTS)
-    there = np.clip(part / _ARRIVE, 0.0, 1.0)
-    back = np.clip((part - _LEAVE) / (1.0 - _LEAVE), 0.0, 1.0)
-    share = _minimum_jerk(there) - _minimum_jerk(back)
+    there = minimum_jerk(part / _ARRIVE)
+    back = minimum_jerk((part - _LEAVE) / (1.0 - _LEAVE))
+    share = there - back
     return part * duration, start + share[:, None] * (posture - start)
-
-
-def _minimum_jerk(s: Array) -> Array:
-    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
 def look_at_hand(

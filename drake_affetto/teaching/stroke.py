@@ -15,6 +15,7 @@ import numpy as np
 from drake_affetto.common.errors import require_range
 from drake_affetto.common.fields import check_ranges, number
 from drake_affetto.common.typing import Array
+from drake_affetto.motion.minimum_jerk import minimum_jerk
 
 
 @dataclasses.dataclass
@@ -194,8 +195,7 @@ def intended_position(stroke: Stroke, grasp: Array, t: float) -> Array:
     if i >= len(stroke.times):
         return np.array(grasp, float)
     begin = 0.0 if i == 0 else stroke.times[i - 1]
-    s = np.clip((t - begin) / (stroke.times[i] - begin), 0.0, 1.0)
-    blend = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    blend = minimum_jerk((t - begin) / (stroke.times[i] - begin))
     return points[i] + blend * (points[i + 1] - points[i])
 
 

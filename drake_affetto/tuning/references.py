@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from drake_affetto.common.errors import require
 from drake_affetto.common.typing import Array
+from drake_affetto.motion.minimum_jerk import minimum_jerk
 from drake_affetto.tuning.config import REST, TRAINING, TuningConfig
 
 
@@ -106,12 +107,6 @@ def joint_range(
         )
         low[i], high[i] = pair
     return JointRange(q, low, high)
-
-
-def minimum_jerk(s: Array) -> Array:
-    """The minimum-jerk blend from 0 to 1 for s in [0, 1], constant outside."""
-    s = np.clip(s, 0.0, 1.0)
-    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
 def make_reference(

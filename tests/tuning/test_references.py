@@ -16,7 +16,6 @@ from drake_affetto.tuning.references import (
     JointRange,
     joint_range,
     make_reference,
-    minimum_jerk,
 )
 
 NAMES = (TRAINING, *HELD_OUT, REST)
@@ -120,18 +119,6 @@ def test_rates_are_the_derivative():
         [[np.zeros(3)], np.cumsum(0.5 * dt * (rate[1:] + rate[:-1]), axis=0)]
     )
     np.testing.assert_allclose(way + reference.q[0], reference.q, atol=2e-3)
-
-
-def test_minimum_jerk_rests_at_both_ends():
-    s = np.linspace(-0.5, 1.5, 2001)
-    x = minimum_jerk(s)
-    assert np.all(x[s <= 0] == 0.0)
-    np.testing.assert_allclose(x[s >= 1], 1.0)
-    assert np.all(np.diff(x) >= -1e-15)
-    for edge in (0.0, 1.0):
-        h = 1e-4
-        y = minimum_jerk(np.array([edge - h, edge, edge + h]))
-        assert abs(y[2] - y[0]) / (2 * h) < 1e-6
 
 
 def test_excursions_keep_a_margin_and_hold_the_start():
