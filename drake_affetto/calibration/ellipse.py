@@ -22,7 +22,6 @@ from drake_affetto.calibration.plane import (
     CalibrationFailure,
     PlaneEstimate,
     PlanePrior,
-    reflect,
 )
 from drake_affetto.common.typing import Array
 from drake_affetto.geometry.optics import (
@@ -30,6 +29,7 @@ from drake_affetto.geometry.optics import (
     invert_pose,
     transform_points,
 )
+from drake_affetto.geometry.planes import reflect
 
 # From how many planes of the prior the search may begin, and does begin.
 _DRAWN, _STARTS = 200, 4

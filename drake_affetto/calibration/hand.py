@@ -22,9 +22,9 @@ from drake_affetto.calibration.plane import (
     CalibrationFailure,
     PlaneEstimate,
     PlanePrior,
-    reflect,
 )
 from drake_affetto.common.typing import Array, Mask
+from drake_affetto.geometry.planes import reflect
 
 # A look that is so many deviations off is left out of the last fit.
 _GROSS = 4.0

@@ -10,7 +10,6 @@ import dataclasses
 
 import numpy as np
 
-from drake_affetto.calibration.plane import normals, reflect
 from drake_affetto.common.fields import check_ranges, number
 from drake_affetto.common.typing import Array, Mask
 from drake_affetto.geometry.kinematics import SerialChain
@@ -19,6 +18,7 @@ from drake_affetto.geometry.optics import (
     invert_pose,
     make_pose,
 )
+from drake_affetto.geometry.planes import normals, reflect
 from drake_affetto.perception.blob import BlobCalibration
 from drake_affetto.perception.camera_model import CameraModel
 from drake_affetto.perception.config import rotation_matrix

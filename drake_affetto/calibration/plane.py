@@ -1,18 +1,16 @@
-"""A mirror's plane as three numbers, and what is known of them.
+"""What is known of a mirror's plane.
 
-The parameters p = (ψ, ε, s) are azimuth and elevation [rad] of the normal,
-n = (cos ε cos ψ, cos ε sin ψ, sin ε), which points into the room, and the
-distance s [m] of a reference point from the plane. With the camera as the
-reference point they are those of `OpticalMap`.
+Its three parameters are those of `drake_affetto.geometry.planes`. With the
+camera as the reference point they are those of `OpticalMap`.
 """
 
 import dataclasses
 
 import numpy as np
 
-from drake_affetto.common.errors import require_range
 from drake_affetto.common.fields import check_ranges, number
 from drake_affetto.common.typing import Array
+from drake_affetto.geometry.planes import moved, normal_slopes
 
 # 95 % of a chi-squared variable of three degrees of freedom.
 CHI2_95 = 7.8147
@@ -20,40 +18,6 @@ CHI2_95 = 7.8147
 
 class CalibrationFailure(Exception):
     """The mirror could not be found; the message says what is missing."""
-
-
-def normals(parameters: Array) -> Array:
-    """Unit normals (..., 3) of planes (..., 3)."""
-    azimuth, elevation = parameters[..., 0], parameters[..., 1]
-    level = np.cos(elevation)
-    return np.stack(
-        [
-            level * np.cos(azimuth),
-            level * np.sin(azimuth),
-            np.sin(elevation),
-        ],
-        axis=-1,
-    )
-
-
-def reflect(parameters: Array, reference: Array, p_W: Array) -> Array:
-    """Mirror images (..., 3) of points p_W (..., 3) in planes (..., 3).
-
-    Args:
-        parameters: Planes; they broadcast against the points.
-        reference: Reference point of the planes (3,), m.
-        p_W: Points, m.
-    """
-    n = normals(np.asarray(parameters, dtype=float))
-    away = np.sum((p_W - reference) * n, axis=-1) + parameters[..., 2]
-    return p_W - 2.0 * away[..., None] * n
-
-
-def moved(parameters: Array, reference: Array, other: Array) -> Array:
-    """The same planes (..., 3), told from another reference point (3,)."""
-    parameters = np.array(parameters, dtype=float)
-    parameters[..., 2] += normals(parameters) @ (other - reference)
-    return parameters
 
 
 @dataclasses.dataclass
@@ -79,7 +43,6 @@ class PlanePrior:
     def check(self, where: str) -> None:
         """Raises InputError naming the first field out of range."""
         check_ranges(self, where)
-        require_range(f"{where}.distance_sd", self.distance_sd, 1e-4)
 
     @property
     def mean(self) -> Array:
@@ -131,25 +94,8 @@ class PlaneEstimate:
     def from_point(self, reference: Array) -> "PlaneEstimate":
         """The same, told from another reference point (3,)."""
         by = reference - self.reference
-        azimuth, elevation, _ = self.parameters
-        slope = np.array(
-            [
-                by
-                @ [
-                    -np.cos(elevation) * np.sin(azimuth),
-                    np.cos(elevation) * np.cos(azimuth),
-                    0.0,
-                ],
-                by
-                @ [
-                    -np.sin(elevation) * np.cos(azimuth),
-                    -np.sin(elevation) * np.sin(azimuth),
-                    np.cos(elevation),
-                ],
-            ]
-        )
         J = np.eye(3)
-        J[2, :2] = slope
+        J[2, :2] = by @ normal_slopes(self.parameters)
         return PlaneEstimate(
             moved(self.parameters, self.reference, reference),
             J @ self.covariance @ J.T,

@@ -17,12 +17,9 @@ from drake_affetto.calibration.knowledge import (
     RobotKnowledge,
     in_image,
 )
-from drake_affetto.calibration.plane import (
-    CalibrationFailure,
-    PlanePrior,
-    reflect,
-)
+from drake_affetto.calibration.plane import CalibrationFailure, PlanePrior
 from drake_affetto.common.typing import Array
+from drake_affetto.geometry.planes import reflect
 
 # Looks with which the plane is guessed, to choose the next posture by.
 _FEWEST_TO_CHOOSE = 3

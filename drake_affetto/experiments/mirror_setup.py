@@ -10,12 +10,13 @@ import functools
 import numpy as np
 
 from drake_affetto.calibration.knowledge import RobotKnowledge
-from drake_affetto.calibration.plane import PlaneEstimate, normals
+from drake_affetto.calibration.plane import PlaneEstimate
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.typing import Array
 from drake_affetto.experiments.plans import SelfCalibrationPlan
 from drake_affetto.experiments.view_maps import ViewDomain
 from drake_affetto.geometry.optics import make_pose
+from drake_affetto.geometry.planes import normals, plane_parameters
 from drake_affetto.perception.camera_model import Mirror
 from drake_affetto.perception.config import rotation_matrix
 from drake_affetto.scene import world
@@ -161,16 +162,8 @@ def judge_plane(estimate: PlaneEstimate, pose: FramePose) -> PlaneJudgement:
     X_WM = pose_matrix(pose)
     n = normals(estimate.parameters)
     off = (X_WM[:3, 3] - estimate.reference) @ n + estimate.parameters[2]
-    truth = X_WM[:3, 2]
-    true = np.array(
-        [
-            np.arctan2(truth[1], truth[0]),
-            np.arcsin(truth[2]),
-            (estimate.reference - X_WM[:3, 3]) @ truth,
-        ]
-    )
     return PlaneJudgement(
-        float(np.arccos(np.clip(n @ truth, -1.0, 1.0))),
+        float(np.arccos(np.clip(n @ X_WM[:3, 2], -1.0, 1.0))),
         float(abs(off)),
-        estimate.covers(true),
+        estimate.covers(plane_parameters(X_WM, estimate.reference)),
     )

@@ -10,7 +10,7 @@ import warnings
 
 import numpy as np
 
-from drake_affetto.calibration.plane import CalibrationFailure, normals
+from drake_affetto.calibration.plane import CalibrationFailure
 from drake_affetto.common.typing import Array
 from drake_affetto.experiments.mirror_setup import (
     judge_plane,
@@ -50,6 +50,7 @@ from drake_affetto.experiments.trials import (
     demonstration,
     run_trials,
 )
+from drake_affetto.geometry.planes import normals, plane_parameters
 from drake_affetto.runner.executor import TrialExecutor
 from drake_affetto.station.scenario import load_scenario
 
@@ -339,9 +340,8 @@ def _beliefs(
 def _true_plane(repeat: Repeat) -> tuple[Array, Array, float]:
     """The true plane of a repeat, for `_line`."""
     X_WM = pose_matrix(repeat.mirror)
-    n = X_WM[:3, 2]
-    plane = np.array([np.arctan2(n[1], n[0]), np.arcsin(n[2]), 0.0])
-    return plane, X_WM[:3, 3], repeat.known.marker_height
+    glass = X_WM[:3, 3]
+    return plane_parameters(X_WM, glass), glass, repeat.known.marker_height
 
 
 def _line(plane: Array, reference: Array, height: float) -> Any:

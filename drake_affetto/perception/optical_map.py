@@ -16,6 +16,11 @@ from drake_affetto.common.errors import require_array
 from drake_affetto.common.fields import check_ranges, number
 from drake_affetto.common.typing import Array
 from drake_affetto.geometry import optics
+from drake_affetto.geometry.planes import (
+    normal_slopes,
+    normals,
+    plane_parameters,
+)
 from drake_affetto.perception.blob import BlobCalibration
 from drake_affetto.perception.camera_model import CameraModel, turn_points
 
@@ -102,15 +107,8 @@ class OpticalMap:
 
     def parameters_of(self, X_WM: Array) -> Array:
         """The parameters (3,) of a mirror at the pose X_WM (4, 4)."""
-        n = X_WM[:3, 2]
         eye = self.target.camera_pose(self.yaw)[:3, 3]
-        return np.array(
-            [
-                np.arctan2(n[1], n[0]),
-                np.arcsin(np.clip(n[2], -1.0, 1.0)),
-                (eye - X_WM[:3, 3]) @ n,
-            ]
-        )
+        return plane_parameters(X_WM, eye)
 
     def starts(
         self, target: Any, source: Any, n_starts: int, random: Any
@@ -200,14 +198,11 @@ class OpticalMap:
         self, parameters: Array, eye: Array, ray: Array
     ) -> tuple[Array, Array]:
         """p_W (N, 3) of the marker, and its derivative (N, 3, 3)."""
-        azimuth, elevation, s = np.asarray(parameters, dtype=float)
-        ca, sa = np.cos(azimuth), np.sin(azimuth)
-        ce, se = np.cos(elevation), np.sin(elevation)
-        n = np.array([ce * ca, ce * sa, se])
+        parameters = np.asarray(parameters, dtype=float)
+        n, s = normals(parameters), parameters[2]
         # Columns: by azimuth, elevation and distance.
-        dn = np.array(
-            [[-ce * sa, -se * ca, 0.0], [ce * ca, -se * sa, 0.0], [0.0, ce, 0]]
-        )
+        dn = np.zeros((3, 3))
+        dn[:, :2] = normal_slopes(parameters)
         origin = eye - 2.0 * s * n
         d_origin = -2.0 * (s * dn + np.outer(n, [0.0, 0.0, 1.0]))
         along = ray @ n

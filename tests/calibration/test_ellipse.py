@@ -9,7 +9,8 @@ from drake_affetto.calibration.ellipse import (
     polygon_moments,
     shape_features,
 )
-from drake_affetto.calibration.plane import CalibrationFailure, moved
+from drake_affetto.calibration.plane import CalibrationFailure
+from drake_affetto.geometry.planes import moved
 from drake_affetto.geometry.region import spread_inside
 from support import mirror_robot
 from support.mirror_robot import (

@@ -10,8 +10,9 @@ from drake_affetto.calibration.hand import (
     HandProblem,
     estimate_from_hand,
 )
-from drake_affetto.calibration.plane import CalibrationFailure, moved
+from drake_affetto.calibration.plane import CalibrationFailure
 from drake_affetto.calibration.postures import PostureChooser
+from drake_affetto.geometry.planes import moved
 from support import mirror_robot
 from support.mirror_robot import MIRROR, angle_between, sees_hand
 

@@ -9,10 +9,10 @@ from drake_affetto.calibration.ellipse import (
     shape_features,
 )
 from drake_affetto.calibration.hand import HandLook
-from drake_affetto.calibration.plane import reflect
 from drake_affetto.experiments import trials
 from drake_affetto.experiments.mirror_looks import way_to
 from drake_affetto.experiments.mirror_setup import true_knowledge
+from drake_affetto.geometry.planes import reflect
 from drake_affetto.scene.world import FramePose
 from support.fake_mirrors import plane_of
 

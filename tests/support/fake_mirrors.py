@@ -6,8 +6,8 @@ on the robot, the true mirror is in the spec alone.
 
 import numpy as np
 
-from drake_affetto.calibration.plane import normals
 from drake_affetto.experiments.mirror_setup import pose_matrix, true_knowledge
+from drake_affetto.geometry.planes import normals
 from drake_affetto.scene.world import FramePose
 from support import mirror_robot
 

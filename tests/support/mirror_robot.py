@@ -12,9 +12,10 @@ from drake_affetto.calibration.knowledge import (
     KnowledgeErrors,
     RobotKnowledge,
 )
-from drake_affetto.calibration.plane import PlanePrior, reflect
+from drake_affetto.calibration.plane import PlanePrior
 from drake_affetto.geometry.kinematics import SerialChain
 from drake_affetto.geometry.optics import PinholeCamera, make_pose
+from drake_affetto.geometry.planes import reflect
 from drake_affetto.perception.blob import BlobCalibration
 
 JOINTS = ("yaw", "pitch", "raise", "spread", "turn", "elbow")
@@ -146,7 +147,7 @@ def misjudged(true: RobotKnowledge, errors: KnowledgeErrors, seed: int):
 
 def angle_between(a, b) -> float:
     """Angle of the normals of two planes, degrees."""
-    from drake_affetto.calibration.plane import normals
+    from drake_affetto.geometry.planes import normals
 
     cosine = normals(np.asarray(a)) @ normals(np.asarray(b))
     return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
