@@ -40,7 +40,8 @@ from drake_affetto.experiments.statistics import (
     compare,
     compare_landing,
     correct_primary,
-    success_rate,
+    scheme_cell,
+    success_table,
 )
 from drake_affetto.experiments.trials import (
     Movement,
@@ -325,18 +326,11 @@ def _make_results(
         landings: dict[str, np.ndarray] = {}
         for name in plan.schemes:
             strikes = _table(plan, outcomes, name, count)
-            flat = [strike for row in strikes for strike in row]
-            successes[name] = _successes(strikes)
+            successes[name] = success_table(strikes)
             landings[name] = np.array(
                 [[s.landing if s else np.nan for s in row] for row in strikes]
             )
-            schemes.setdefault(name, {})[count] = SchemeCell(
-                success_rate(successes[name]),
-                successes[name].mean(axis=1).tolist(),
-                [s.reward if s else 0.0 for s in flat],
-                [s.landing if s else None for s in flat],
-                float(np.mean([s.graze if s else False for s in flat])),
-            )
+            schemes.setdefault(name, {})[count] = scheme_cell(strikes)
         comparisons += compare(successes, count)
         comparisons += [
             compare_landing(landings, pair, count)
@@ -350,7 +344,7 @@ def _make_results(
             comparisons, PRIMARY_PAIRS, PRIMARY_SAMPLES
         ),
         map=example,
-        chance=success_rate(_successes(_table(plan, outcomes, _BLIND, 0))),
+        chance=scheme_cell(_table(plan, outcomes, _BLIND, 0)).success_rate,
         bodies=robots.numbers(),
         knowledge=_knowledge(plan),
     )
@@ -378,13 +372,6 @@ def _table(
         ]
         for repeat in range(plan.repeats)
     ]
-
-
-def _successes(strikes: Sequence[Sequence[StrikeResult | None]]) -> np.ndarray:
-    return np.array(
-        [[s.success if s else False for s in row] for row in strikes],
-        dtype=float,
-    )
 
 
 def _map(

@@ -6,7 +6,6 @@ demonstrations before the same mirror, at the same positions.
 
 from collections.abc import Mapping, Sequence
 from typing import Any
-import warnings
 
 import numpy as np
 
@@ -20,7 +19,6 @@ from drake_affetto.experiments.plans import SelfCalibrationPlan
 from drake_affetto.experiments.results import (
     DemonstrationResult,
     MirrorResults,
-    SchemeCell,
     StrikeResult,
 )
 from drake_affetto.experiments.results.self_calibration import (
@@ -36,12 +34,15 @@ from drake_affetto.experiments.self_calibration import (
     SelfCalibration,
     belief_transform,
 )
-from drake_affetto.experiments.skills import successful, task_parameters
-from drake_affetto.experiments.statistics import success_rate
+from drake_affetto.experiments.skills import (
+    fit_with,
+    successful,
+    task_parameters,
+)
+from drake_affetto.experiments.statistics import scheme_cell, success_rate
 from drake_affetto.experiments.stroke_courses import (
     Strokes,
     listen,
-    sounded,
     strokes_result,
     watch,
 )
@@ -52,7 +53,6 @@ from drake_affetto.experiments.trials import (
 )
 from drake_affetto.geometry.planes import normals, plane_parameters
 from drake_affetto.runner.executor import TrialExecutor
-from drake_affetto.station.scenario import load_scenario
 
 _TEST, _SAMPLES = range(300, 302)
 
@@ -89,7 +89,7 @@ def run_self_calibration(
         workspace=1.0,
         schemes={
             name: {
-                count: _cell(study, tests, (name, count))
+                count: scheme_cell(_table(study, tests, (name, count)))
                 for count in plan.samples
             }
             for name in plan.schemes
@@ -176,24 +176,22 @@ def _fit(
 ) -> Any:
     """A scheme, fitted to the samples; it knows the robot as badly."""
     from drake_affetto.skill.optical import OpticalMapping
-    from drake_affetto.skill.schemes import make_scheme
 
-    loaded = load_scenario(study.plan.scenario)
-    scheme = make_scheme(
-        name, repeat.skill, input_range=loaded.skill.input_range
-    )
+    parameters: dict[str, Any] = {}
     if name == "transfer_default":
         optical = repeat.known.optical_map()
-        scheme.set_params(
-            mapping=OpticalMapping(**vars(optical)), residual=None
-        )
-    with warnings.catch_warnings():
-        # That few samples do not determine the map is what is studied.
-        warnings.simplefilter("ignore", UserWarning)
-        return scheme.fit(
-            task_parameters(samples),
-            np.array([each.theta for each in samples]),
-        )
+        parameters = {
+            "mapping": OpticalMapping(**vars(optical)),
+            "residual": None,
+        }
+    return fit_with(
+        name,
+        repeat.skill,
+        task_parameters(samples),
+        np.array([each.theta for each in samples]),
+        study.scenario.skill,
+        **parameters,
+    )
 
 
 # Unseen positions
@@ -250,21 +248,6 @@ def _table(
     ]
 
 
-def _cell(
-    study: SelfCalibration, tests: Mapping[Any, StrikeResult | None], name: Any
-) -> SchemeCell:
-    strikes = _table(study, tests, name)
-    success = np.array([[sounded(s) for s in row] for row in strikes], float)
-    flat = [strike for row in strikes for strike in row]
-    return SchemeCell(
-        success_rate(success),
-        success.mean(axis=1).tolist(),
-        [s.reward if s else 0.0 for s in flat],
-        [s.landing if s else None for s in flat],
-        float(np.mean([s.graze if s else False for s in flat])),
-    )
-
-
 def _method(
     study: SelfCalibration,
     name: str,
@@ -272,7 +255,7 @@ def _method(
     tests: Mapping[Any, StrikeResult | None],
     by_ear: Sequence[Strokes],
 ) -> MethodResult:
-    cell = _cell(study, tests, name)
+    cell = scheme_cell(_table(study, tests, name))
     rows = [_plane_row(each, found[each.number]) for each in study.repeats]
     covered = [row.covered for row in rows if row.covered is not None]
     return MethodResult(

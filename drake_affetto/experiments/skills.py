@@ -298,15 +298,44 @@ def fit_scheme(
     Raises:
         ValueError: for another name.
     """
+    loaded = load_scenario(scenario)
+    parameters: dict[str, Any] = {}
+    if name == "transfer_default":
+        parameters = {
+            "mapping": _mapping(loaded.transfer, scenario, direct, seed),
+            "residual": "smooth" if loaded.transfer.residual else None,
+        }
+    return fit_with(name, source, tau, theta, loaded.skill, **parameters)
+
+
+def fit_with(
+    name: str,
+    source: "ElmRegressor",
+    tau: np.ndarray,
+    theta: np.ndarray,
+    config: SkillConfig,
+    **parameters: Any,
+) -> Any:
+    """A scheme with these parameters, fitted to what is new.
+
+    Args:
+        name: one of `drake_affetto.skill.schemes.SCHEMES`.
+        source: the skill as learned before; it is not changed.
+        tau: (N, 2) task parameters in the new condition.
+        theta: (N, F) demonstrated there.
+        config: of a skill in the new condition.
+        parameters: of the scheme, as its `set_params` takes them.
+
+    Returns:
+        A fitted regressor from τ̂ to θ.
+
+    Raises:
+        ValueError: for another name.
+    """
     from drake_affetto.skill.schemes import make_scheme
 
-    loaded = load_scenario(scenario)
-    scheme = make_scheme(name, source, input_range=loaded.skill.input_range)
-    if name == "transfer_default":
-        scheme.set_params(
-            mapping=_mapping(loaded.transfer, scenario, direct, seed),
-            residual="smooth" if loaded.transfer.residual else None,
-        )
+    scheme = make_scheme(name, source, input_range=config.input_range)
+    scheme.set_params(**parameters)
     with warnings.catch_warnings():
         # That few samples do not determine the map is what is studied.
         warnings.simplefilter("ignore", UserWarning)

@@ -13,7 +13,13 @@ from numpy.typing import ArrayLike
 from scipy import stats
 
 from drake_affetto.common.errors import require
-from drake_affetto.experiments.results import SchemeComparisonRow, SuccessRate
+from drake_affetto.common.typing import Array
+from drake_affetto.experiments.results import (
+    SchemeCell,
+    SchemeComparisonRow,
+    StrikeResult,
+    SuccessRate,
+)
 
 # How alike trials of one repeat are taken to be where all trials went alike, so
 # that it cannot be seen: about what it is at rates of 80 to 95 %.
@@ -21,6 +27,40 @@ _ASSUMED_CORRELATION = 0.1
 # Up to how many repeats all sign changes are gone through (2^n of them).
 _EXACT = 14
 _RESAMPLES = 20_000
+
+
+def sounded(strike: StrikeResult | None) -> bool:
+    """Whether a strike made the drum sound; None: nothing was struck."""
+    return strike is not None and strike.success
+
+
+def success_table(
+    strikes: Sequence[Sequence[StrikeResult | None]],
+) -> Array:
+    """1 where a strike sounded, else 0: a row a repeat, a column a trial."""
+    return np.array([[sounded(s) for s in row] for row in strikes], float)
+
+
+def scheme_cell(
+    strikes: Sequence[Sequence[StrikeResult | None]],
+) -> SchemeCell:
+    """What the strikes of a scheme come to.
+
+    Args:
+        strikes: A row a repeat, a column a test position.
+
+    Raises:
+        InputError: If there is no strike.
+    """
+    successes = success_table(strikes)
+    flat = [strike for row in strikes for strike in row]
+    return SchemeCell(
+        success_rate(successes),
+        successes.mean(axis=1).tolist(),
+        [s.reward if s else 0.0 for s in flat],
+        [s.landing if s else None for s in flat],
+        float(np.mean([s.graze if s else False for s in flat])),
+    )
 
 
 def success_rate(successes: ArrayLike, level: float = 0.95) -> SuccessRate:

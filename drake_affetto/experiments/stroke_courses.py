@@ -15,7 +15,7 @@ from drake_affetto.calibration.belief import PlaneBelief, Stroke
 from drake_affetto.calibration.watch import StrokeWatch
 from drake_affetto.common.typing import Array
 from drake_affetto.experiments.mirror_setup import turned
-from drake_affetto.experiments.results import GazeResult, StrikeResult
+from drake_affetto.experiments.results import GazeResult
 from drake_affetto.experiments.results.self_calibration import (
     StrokesResult,
     WatchResult,
@@ -25,7 +25,7 @@ from drake_affetto.experiments.self_calibration import (
     MirroredSkill,
     SelfCalibration,
 )
-from drake_affetto.experiments.statistics import success_rate
+from drake_affetto.experiments.statistics import sounded, success_rate
 from drake_affetto.experiments.trials import Movement
 from drake_affetto.scene.world import FramePose
 
@@ -179,10 +179,6 @@ def _spec(
     repeat = study.repeats[number]
     mover = Movement(repeat.skill.predict([stroke.tau])[0])
     return study.strike_spec(repeat, *drum, gaze, mover)
-
-
-def sounded(strike: StrikeResult | None) -> bool:
-    return strike is not None and strike.success
 
 
 def strokes_result(strokes: Strokes) -> StrokesResult:

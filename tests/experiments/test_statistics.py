@@ -8,12 +8,14 @@ import pytest
 from scipy import stats
 
 from drake_affetto.common.errors import InputError
+from drake_affetto.experiments.results import StrikeResult
 from drake_affetto.experiments.statistics import (
     cohens_h,
     compare,
     compare_landing,
     holm,
     paired_p,
+    scheme_cell,
     success_rate,
 )
 
@@ -136,3 +138,23 @@ def test_a_repeat_without_a_stroke_has_no_landing():
         assert row.difference == pytest.approx(-0.03)
         none = {"near": nothing, "far": nothing}
         assert compare_landing(none, ("near", "far"), 3).p is None
+
+
+def strike(reward: float, landing: float, graze: bool) -> StrikeResult:
+    return StrikeResult(
+        reward, reward > 0.15, 1.0, 0.1, landing, graze, np.zeros(3)
+    )
+
+
+def test_a_cell_counts_what_was_not_struck_as_missed():
+    cell = scheme_cell(
+        [
+            [strike(0.4, 0.01, False), strike(0.2, 0.05, True)],
+            [strike(0.1, 0.09, False), None],
+        ]
+    )
+    assert cell.success_rate == success_rate([[1, 1], [0, 0]])
+    assert cell.per_repeat == [1.0, 0.0]
+    assert cell.rewards == [0.4, 0.2, 0.1, 0.0]
+    assert cell.landing == [0.01, 0.05, 0.09, None]
+    assert cell.grazes == 0.25
