@@ -98,9 +98,7 @@ class PlaneBelief:
     ) -> "PlaneBelief":
         """The belief after a calibration, with the covariance it states."""
         told = estimate.from_point(knowledge.eye_position)
-        planes = rng.multivariate_normal(
-            told.parameters, told.covariance, config.particles
-        )
+        planes = told.draw(config.particles, rng)
         return cls(knowledge, planes, workspace, config, rng)
 
     @property

@@ -102,6 +102,10 @@ class PlaneEstimate:
             reference,
         )
 
+    def draw(self, count: int, rng: np.random.Generator) -> Array:
+        """Planes (count, 3) as they are believed possible."""
+        return rng.multivariate_normal(self.parameters, self.covariance, count)
+
     def distance2(self, parameters: Array) -> float:
         """Squared distance of a plane (3,) in deviations (Mahalanobis)."""
         off = np.asarray(parameters) - self.parameters

@@ -239,6 +239,8 @@ class HandCalibration:
         self._prior, self._config = prior, config
         self._chooser = PostureChooser(knowledge, errors, prior, config, rng)
         self.looks: list[HandLook] = []
+        # What the looks until now tell, once it has been asked for.
+        self._outcome: HandEstimate | CalibrationFailure | None = None
 
     @property
     def done(self) -> bool:
@@ -264,6 +266,7 @@ class HandCalibration:
     def add(self, look: HandLook) -> None:
         """Takes in a look."""
         self.looks.append(look)
+        self._outcome = None
 
     def estimate(self) -> HandEstimate:
         """What the looks tell.
@@ -271,6 +274,13 @@ class HandCalibration:
         Raises:
             CalibrationFailure: If they do not determine the plane.
         """
-        return estimate_from_hand(
-            *self._known, self.looks, self._prior, self._config
-        )
+        if self._outcome is None:
+            try:
+                self._outcome = estimate_from_hand(
+                    *self._known, self.looks, self._prior, self._config
+                )
+            except CalibrationFailure as failure:
+                self._outcome = failure
+        if isinstance(self._outcome, CalibrationFailure):
+            raise self._outcome
+        return self._outcome

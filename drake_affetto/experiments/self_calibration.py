@@ -59,6 +59,9 @@ from drake_affetto.station.scenario import load_scenario
 # What the seeds of this study are for; the skill's are those of the drum study.
 _MIRROR, _ERRORS, _TESTS, _TRIALS, _HAND, _PLACES, _EAR = range(200, 207)
 
+# Planes in a picture of what is believed.
+PICTURED = 40
+
 
 @dataclasses.dataclass
 class Repeat:
@@ -369,9 +372,7 @@ class SelfCalibration:
             return Calibrated(
                 None, repeat.known, None, looks, failure=str(failure)
             )
-        drawn = self.rng(_PLACES, repeat.number).multivariate_normal(
-            estimate.plane.parameters, estimate.plane.covariance, 40
-        )
+        drawn = estimate.plane.draw(PICTURED, self.rng(_PLACES, repeat.number))
         return Calibrated(
             estimate.plane,
             estimate.knowledge,
@@ -431,7 +432,5 @@ def _step(session: HandCalibration) -> list[tuple[int, Array]]:
         plane = session.estimate().plane
     except CalibrationFailure:
         return []
-    drawn = np.random.default_rng(0).multivariate_normal(
-        plane.parameters, plane.covariance, 40
-    )
+    drawn = plane.draw(PICTURED, np.random.default_rng(0))
     return [(len(session.looks), drawn)]

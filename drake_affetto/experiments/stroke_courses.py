@@ -21,6 +21,7 @@ from drake_affetto.experiments.results.self_calibration import (
     WatchResult,
 )
 from drake_affetto.experiments.self_calibration import (
+    PICTURED,
     Calibrated,
     MirroredSkill,
     SelfCalibration,
@@ -40,8 +41,6 @@ _IN_TIME, _GIVEN_UP, _AFTER = 6, 10, 4
 _STRANGE = 0.05
 # After these strokes the first repeat's belief is kept for the picture.
 _SHOWN = (0, 1, 2, 4, 6, 9, 12, 18, 24)
-# Planes in a picture of a belief.
-_LINES = 40
 
 
 @dataclasses.dataclass
@@ -322,7 +321,7 @@ def _recovered(study: SelfCalibration, mirrors: Mapping[int, FramePose]) -> Any:
 
 
 def _shown(belief: PlaneBelief) -> Array:
-    """Some planes of a belief (40, 3)."""
+    """Some planes of a belief (PICTURED, 3)."""
     rng = np.random.default_rng(0)
-    chosen = rng.choice(len(belief.planes), _LINES, p=belief.weights)
+    chosen = rng.choice(len(belief.planes), PICTURED, p=belief.weights)
     return belief.planes[chosen]

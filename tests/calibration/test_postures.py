@@ -57,6 +57,17 @@ def test_few_looks_are_enough_for_a_goal():
     assert plane.angle_sd <= 0.01
 
 
+def test_an_estimate_takes_in_each_look_and_is_made_once():
+    calibration = session(looks=12, angle_goal=0.01, distance_goal=0.005)
+    done = look_until_done(calibration, lambda q: sees_hand(TRUE, MIRROR, q))
+    before = done.estimate()
+    assert done.estimate() is before
+    # The same posture once more, with the noise of another image.
+    seen = next(look for look in done.looks if look.pixel is not None)
+    done.add(HandLook(seen.readings, seen.pixel + 1.0))
+    assert len(done.estimate().used) == len(before.used) + 1
+
+
 def test_no_posture_is_tried_twice():
     done = look_until_done(
         session(angle_goal=0.0, looks=12), lambda q: sees_hand(TRUE, MIRROR, q)
