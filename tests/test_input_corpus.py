@@ -23,7 +23,7 @@ from support.input_corpus import READERS, SHARES, Outcome, Reader
 ROOT = Path(__file__).parents[1]
 COUNT = 520
 
-# What is stored in trials.sqlite is read with checks elsewhere.
+# What is stored in trials.sqlite has a test of its own.
 KINDS = [reader.kind for reader in READERS if reader.kind != "trials"]
 
 
@@ -65,9 +65,6 @@ def test_five_hundred_damaged_inputs_end_well_or_in_one_line():
     assert named > 0.93 * known
 
 
-@pytest.mark.xfail(
-    reason="stored trials are not read with checks yet", strict=False
-)
 def test_damaged_trials_are_refused():
     assert run_corpus("--count", "150", "--kinds", "trials")[1] == []
 

@@ -8,7 +8,7 @@ import typing
 from typing import Any, TypeVar
 
 from drake_affetto.common.errors import InputError, require_range, shown
-from drake_affetto.common.fields import option_name
+from drake_affetto.common.fields import option_name, read_number
 from drake_affetto.common.output import STORE
 
 WORKERS = 2
@@ -36,11 +36,8 @@ def real_number(text: str) -> float:
 
 
 def _number(text: str, kind: type[T], expected: str) -> T:
-    # Python reads 1_0 as 10, and digits of any script.
     try:
-        if "_" in text or not text.isascii():
-            raise ValueError
-        return kind(text)  # type: ignore[call-arg]
+        return read_number(text, kind)
     except ValueError:
         raise argparse.ArgumentTypeError(
             f"{shown(text)} is not {expected}"

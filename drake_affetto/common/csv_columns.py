@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drake_affetto.common.errors import InputError, shown
+from drake_affetto.common.fields import read_number
 
 
 def read_columns(
@@ -69,7 +70,7 @@ def read_columns(
 
 
 def _number(row: Sequence[str], place: int, where: str) -> float:
-    """The number in a cell; Python's 1_0, and digits of any script, are none.
+    """The number in a cell.
 
     Raises:
         InputError: If the cell is missing or holds something else.
@@ -78,9 +79,7 @@ def _number(row: Sequence[str], place: int, where: str) -> float:
         raise InputError(f"{where} is missing: there are {len(row)} cells")
     cell = row[place]
     try:
-        if "_" in cell or not cell.isascii():
-            raise ValueError
-        return float(cell)
+        return read_number(cell, float)
     except ValueError:
         raise InputError(
             f"{where} is {shown(cell)}, expected a number"

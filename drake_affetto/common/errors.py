@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 import contextlib
 import math
 from pathlib import Path
-import reprlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -40,21 +39,6 @@ def require(condition: bool, field: str, value: Any, expected: str) -> None:
 def one_line(message: object) -> str:
     """A message of others, which may have several lines, as one."""
     return " ".join(str(message).split())
-
-
-class _Short:
-    """Looks like a value, but not longer than a line."""
-
-    def __init__(self, value: Any) -> None:
-        self._text = reprlib.repr(value)
-
-    def __repr__(self) -> str:
-        return self._text
-
-
-def short(value: Any) -> Any:
-    """What stands in errors for a value that may be a whole file."""
-    return _Short(value)
 
 
 @contextlib.contextmanager

@@ -4,9 +4,11 @@ One declaration serves the check of a value and the command's option.
 """
 
 import dataclasses
-from typing import Any
+from typing import Any, TypeVar
 
 from drake_affetto.common.errors import require_range
+
+T = TypeVar("T", int, float)
 
 
 def number(
@@ -61,6 +63,21 @@ def option(
         default=default,
         metadata={"help": help, "metavar": metavar, "aliases": aliases},
     )
+
+
+def read_number(text: str, kind: type[T]) -> T:
+    """A number in decimal notation; Python's 1_0 and other scripts are none.
+
+    Args:
+        text: What a user or a file has.
+        kind: int or float.
+
+    Raises:
+        ValueError: If it is no such number.
+    """
+    if "_" in text or not text.isascii():
+        raise ValueError(f"{text!r} is not in decimal notation")
+    return kind(text)  # type: ignore[call-arg]
 
 
 def option_name(field: dataclasses.Field) -> str:

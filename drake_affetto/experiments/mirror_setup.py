@@ -15,10 +15,8 @@ from drake_affetto.common.errors import InputError
 from drake_affetto.common.typing import Array
 from drake_affetto.experiments.plans import SelfCalibrationPlan
 from drake_affetto.experiments.view_maps import ViewDomain
-from drake_affetto.geometry.optics import make_pose
 from drake_affetto.geometry.planes import normals, plane_parameters
 from drake_affetto.perception.camera_model import Mirror
-from drake_affetto.perception.config import rotation_matrix
 from drake_affetto.scene import world
 from drake_affetto.scene.world import FramePose
 
@@ -80,10 +78,7 @@ def true_knowledge(scenario: str, direct: str) -> RobotKnowledge:
 
 def pose_matrix(pose: FramePose) -> Array:
     """X_WM (4, 4) of a mirror at this pose."""
-    return make_pose(
-        rotation_matrix(list(np.radians(pose.rotation))),
-        np.array(pose.translation),
-    )
+    return pose.transform().GetAsMatrix4()
 
 
 def nominal_pose(scenario: str) -> FramePose:

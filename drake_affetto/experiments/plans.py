@@ -16,15 +16,15 @@ GREATEST_SEED = 2**31 - 1
 class Plan:
     """The plan of a study; fields with a help are options of its command."""
 
-    def __post_init__(self) -> None:
-        """Each body has a repeat of its own."""
-        bodies = getattr(self, "bodies", 0)
-        if isinstance(bodies, int) and bodies > 0:
-            object.__setattr__(self, "repeats", bodies)
-
     def check(self) -> None:
         """Raises InputError for the first value that does not fit."""
         check_ranges(self)
+
+
+def _repeat_for_bodies(plan: "DrumPlan | MirrorPlan") -> None:
+    # What is no number is told by `check`.
+    if isinstance(plan.bodies, int) and plan.bodies > 0:
+        object.__setattr__(plan, "repeats", plan.bodies)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,6 +65,10 @@ class DrumPlan(Plan):
     )
     scenario: str = option("drumming", "scenario, by name or YAML file")
     seed: int = number(0, 0, GREATEST_SEED, "seed of everything that is random")
+
+    def __post_init__(self) -> None:
+        """Each body has a repeat of its own."""
+        _repeat_for_bodies(self)
 
     def check(self) -> None:
         """Raises InputError for the first value that does not fit."""
@@ -131,6 +135,10 @@ class MirrorPlan(Plan):
     direct: str = "drumming"
     name: str = ""
     seed: int = number(0, 0, GREATEST_SEED, "seed of everything that is random")
+
+    def __post_init__(self) -> None:
+        """Each body has a repeat of its own."""
+        _repeat_for_bodies(self)
 
     @property
     def pool_size(self) -> int:

@@ -65,8 +65,8 @@ from drake_affetto.station.scenario import Scenario, load_scenario
 # it, what led to the scenario.
 _RUNNERS: dict[Content, tuple[str, TrialRunner]] = {}
 
-# Each keeps a Diagram with its renderers, 36 MiB. Studies of many bodies go
-# from one to the next; an own order of two scenarios needs no more either.
+# Each keeps a Diagram with its renderers, 36 MiB. A study of many bodies goes
+# from one to the next and does not come back; others have two scenarios.
 _MOST_RUNNERS = 6
 
 NAME = "@name"

@@ -21,7 +21,7 @@ import numpy as np
 from drake_affetto.common.typing import Array, Mask
 from drake_affetto.geometry import optics
 from drake_affetto.geometry.optics import Camera
-from drake_affetto.perception.blob import Blob
+from drake_affetto.perception.blob import LEAST_SEEN, LEAST_TO_COMPLETE, Blob
 from drake_affetto.perception.camera_model import Mirror
 
 # Fitted to 117 rendered places, direct and mirrored, at 320 × 240 pixels.
@@ -35,9 +35,6 @@ _RIM = 0.09
 
 # Error of a completed marker: standard deviation for all hidden at area 1.
 _COMPLETION = 30.0
-_LEAST_TO_COMPLETE = 60.0
-# Share of the marker of which less is not found.
-_LEAST_SEEN = 0.5
 
 _SAMPLES = 60
 
@@ -237,7 +234,7 @@ def too_little_seen(area: float, whole_area: float) -> bool:
         area: of what is seen [pixels²].
         whole_area: of the whole marker's image [pixels²].
     """
-    return _LEAST_TO_COMPLETE <= area < _LEAST_SEEN * whole_area
+    return LEAST_TO_COMPLETE <= area < LEAST_SEEN * whole_area
 
 
 def completed(
@@ -260,7 +257,8 @@ def completed(
         seed: of the error.
     """
     hidden = 1.0 - area / max(whole_area, 1e-9)
-    if hidden < 0.01 or area < _LEAST_TO_COMPLETE or hidden > 0.5:
+    small = area < LEAST_TO_COMPLETE
+    if hidden < 0.01 or small or hidden > 1.0 - LEAST_SEEN:
         return centroid
     cell = np.floor(np.asarray(centroid) / _RASTER_STEP).astype(int)
     rng = np.random.default_rng([*(cell + 2**20), seed, 1])

@@ -208,7 +208,7 @@ class Blob:
 
 
 # Rims of fewer pixels do not tell an ellipse from another [pixels²].
-_LEAST_TO_COMPLETE = 60.0
+LEAST_TO_COMPLETE = 60.0
 # How far a whole marker's rim is off its ellipse, at most of it [pixels].
 _ROUGH = 0.68
 # The same of a large one, by the root of its area, for lens and lattice.
@@ -221,7 +221,7 @@ _CLEAN = 0.55
 _SMALL = 150.0
 # Of a whole that is completed from its parts, the share that is seen, and of
 # one put together the share of its rim.
-_LEAST_SEEN = 0.5
+LEAST_SEEN = 0.5
 _LEAST_COVERED = 0.65
 # Parts that are looked at, and of those the ones that may belong together.
 _MOST_PARTS = 8
@@ -466,7 +466,7 @@ def _join_group(
     if (
         area < config.min_area
         or aspect > config.max_aspect
-        or not _LEAST_SEEN <= seen < 1.1
+        or not LEAST_SEEN <= seen < 1.1
         or covered < _LEAST_COVERED
         or ellipse.beyond(rim) > max(_BEYOND, _ROUGHER * math.sqrt(area))
     ):
@@ -493,7 +493,7 @@ def _complete(
     """
     area, u, v, xx, xy, yy = part.moments
     doubtful = dataclasses.replace(blob, confidence=_DOUBT * blob.confidence)
-    if area < _LEAST_TO_COMPLETE or len(part.rim) < 16:
+    if area < LEAST_TO_COMPLETE or len(part.rim) < 16:
         # Too small to tell: unless more of it may be beside it.
         return doubtful if _has_company(part, parts) else blob
     # A filled ellipse's axes are twice its standard deviations; the rim's
@@ -520,7 +520,7 @@ def _complete(
     aspect = float(size[0] / size[1])
     shift = float(np.linalg.norm(ellipse.center - [u, v]))
     if (
-        not _LEAST_SEEN < seen < 1.1
+        not LEAST_SEEN < seen < 1.1
         or aspect > config.max_aspect
         or shift > float(size[0])
         or ellipse.beyond(part.rim) > max(_BEYOND, _ROUGHER * math.sqrt(area))

@@ -12,7 +12,7 @@ import reprlib
 from typing import Any
 
 from drake_affetto import __version__
-from drake_affetto.common.errors import InputError, require, short
+from drake_affetto.common.errors import InputError, require
 from drake_affetto.common.typed_json import from_plain
 from drake_affetto.experiments.results import STUDY_RESULTS, read_study
 from drake_affetto.tuning.results import TuningResults
@@ -99,7 +99,7 @@ def read_json(path: Path) -> dict[str, Any]:
         plain = json.loads(path.read_bytes(), parse_constant=_refuse)
     except (ValueError, OSError, RecursionError) as error:
         raise InputError(f"{path} is not readable JSON: {error}") from error
-    require(isinstance(plain, dict), str(path), short(plain), "an object")
+    require(isinstance(plain, dict), str(path), plain, "an object")
     return plain
 
 

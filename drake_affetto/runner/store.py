@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from drake_affetto.common.errors import InputError, one_line, require, short
+from drake_affetto.common.errors import InputError, one_line, require
 from drake_affetto.common.fingerprint import text_digest
 from drake_affetto.common.nested import leaves, map_leaves
 from drake_affetto.runner.arrays import pack_arrays, unpack_arrays
@@ -94,7 +94,7 @@ def _object(text: str, where: str) -> dict[str, Any]:
         plain = json.loads(text)
     except (ValueError, TypeError, RecursionError) as error:
         raise InputError(f"{where} is damaged: {one_line(error)}") from error
-    require(isinstance(plain, dict), where, short(plain), "an object")
+    require(isinstance(plain, dict), where, plain, "an object")
     return plain
 
 
@@ -264,7 +264,12 @@ class TrialStore:
                 raise InputError(f"{self.path} is damaged: {one_line(found)}")
             keys = self._db.execute("SELECT key FROM trials").fetchall()
         for (key,) in keys:
+            self._require_text("key", key, key)
             self._result(key)
+
+    def _require_text(self, column: str, value: Any, key: Any) -> None:
+        where = f"{self.path}: trial {key}: {column}"
+        require(isinstance(value, str), where, value, "a text")
 
     def get(
         self, spec: Mapping[str, Any]
@@ -283,7 +288,7 @@ class TrialStore:
         except InputError as error:
             raise InputError(
                 f"{where}: its arrays are damaged: {one_line(error)}"
-            ) from (error)
+            ) from error
 
     def _result(self, key: str) -> tuple[dict[str, Any], bytes, str] | None:
         """Result and packed arrays of a row, and its name in errors."""
@@ -468,6 +473,8 @@ class TrialStore:
                 "LIMIT 1) FROM trials ORDER BY finished_at, rowid"
             ):
                 where = f"{self.path}: trial {key}"
+                self._require_text("key", key, key)
+                self._require_text("kind", kind, key)
                 yield TrialRow(
                     key,
                     kind,

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RevoluteJoint
 
-from drake_affetto.common.errors import InputError, require, require_range
+from drake_affetto.common.errors import naming, require, require_range
 from drake_affetto.scene.world import get_joint
 
 
@@ -23,10 +23,8 @@ def set_joint_damping(
     """
     for name, value in damping.items():
         require_range(f"joint_damping.{name}", value, 0.0, 100.0)
-        try:
+        with naming("joint_damping"):
             joint = get_joint(plant, name)
-        except InputError as error:
-            raise InputError(f"joint_damping: {error}") from None
         require(
             isinstance(joint, RevoluteJoint),
             f"joint_damping.{name}",

@@ -1,7 +1,12 @@
 """Frames and bodies of a scene by their scoped names, `model::name`."""
 
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame, FrameIndex, RigidBody
+from pydrake.multibody.tree import (
+    Frame,
+    FrameIndex,
+    ModelInstanceIndex,
+    RigidBody,
+)
 
 from drake_affetto.common.errors import require
 
@@ -26,11 +31,16 @@ def find_frame(plant: MultibodyPlant, name: str, field: str = "frame") -> Frame:
         found = [each for each in found if each.name() == frame]
         require(len(found) == 1, field, name, expected)
         return found[0]
-    has_model = plant.HasModelInstanceNamed(model)
-    instance = plant.GetModelInstanceByName(model) if has_model else None
-    has = has_model and plant.HasFrameNamed(frame, instance)
+    instance = _find_model(plant, model)
+    has = instance is not None and plant.HasFrameNamed(frame, instance)
     require(has, field, name, expected)
     return plant.GetFrameByName(frame, instance)
+
+
+def _find_model(plant: MultibodyPlant, name: str) -> ModelInstanceIndex | None:
+    if not plant.HasModelInstanceNamed(name):
+        return None
+    return plant.GetModelInstanceByName(name)
 
 
 def find_body(
@@ -47,8 +57,7 @@ def find_body(
         InputError: If there is no such body.
     """
     model, _, body = name.rpartition("::")
-    has_model = plant.HasModelInstanceNamed(model)
-    instance = plant.GetModelInstanceByName(model) if has_model else None
-    has = has_model and plant.HasBodyNamed(body, instance)
+    instance = _find_model(plant, model)
+    has = instance is not None and plant.HasBodyNamed(body, instance)
     require(has, field, name, "a body of the scene, as model::body")
     return plant.GetBodyByName(body, instance)

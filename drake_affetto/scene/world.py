@@ -41,6 +41,8 @@ from pydrake.systems.framework import Context
 
 from drake_affetto.common.errors import (
     InputError,
+    naming,
+    one_line,
     require,
     require_array,
     require_range,
@@ -93,6 +95,12 @@ class FramePose:
             for i, number in enumerate(value):
                 require_range(f"{where}.{field}[{i}]", number, -limit, limit)
 
+    def transform(self) -> RigidTransform:
+        """The pose as Drake has it."""
+        return RigidTransform(
+            RollPitchYaw(np.radians(self.rotation)), self.translation
+        )
+
 
 @dataclasses.dataclass
 class WorldConfig:
@@ -127,10 +135,8 @@ class WorldConfig:
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that does not fit."""
         for field in ("directives", "drum"):
-            try:
+            with naming(f"{where}.{field}"):
                 resolve(getattr(self, field))
-            except InputError as error:
-                raise InputError(f"{where}.{field}: {error}") from None
         require(
             len(self.drum_position) == 2,
             f"{where}.drum_position",
@@ -205,7 +211,7 @@ def _move_frames(directives: ModelDirectives, config: WorldConfig) -> None:
                 )
             X_PF = added[name].X_PF
             translation = np.array(pose.translation, dtype=float)
-            turn = RollPitchYaw(np.deg2rad(pose.rotation)).ToRotationMatrix()
+            turn = pose.transform().rotation()
             if field == "offsets":
                 before = X_PF.GetDeterministicValue()
                 translation = translation + before.translation()
@@ -220,8 +226,7 @@ def _reading(uri: str) -> Iterator[None]:
     try:
         yield
     except RuntimeError as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"cannot read {uri}: {reason}") from error
+        raise InputError(f"cannot read {uri}: {one_line(error)}") from error
 
 
 def _require_scene(plant: MultibodyPlant, uri: str) -> None:
@@ -325,10 +330,8 @@ def check_posture(
 ) -> None:
     """Raises InputError for an unknown joint or an angle beyond its limits."""
     for name, angle in posture.items():
-        try:
+        with naming(where):
             joint = get_joint(plant, name)
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
         require_range(
             f"{where}.{name}",
             angle,
@@ -499,6 +502,28 @@ def drum_limits(
     return lower[:2] + radius, upper[:2] - radius
 
 
+def require_on_table(
+    plant: MultibodyPlant, context: Context, field: str, *places: np.ndarray
+) -> None:
+    """Raises InputError unless drums at x, y (2,) are wholly on the table.
+
+    Args:
+        plant: The finalized plant.
+        context: The plant's context.
+        field: What names the places, for errors.
+        places: World x, y (2,) each, m.
+    """
+    low, high = drum_limits(plant, context)
+    for place in places:
+        require(
+            bool(np.all(place >= low) and np.all(place <= high)),
+            field,
+            place.tolist(),
+            f"x from {low[0]:.3f} to {high[0]:.3f} and y from {low[1]:.3f} to "
+            f"{high[1]:.3f} m (the drum stands wholly on the table)",
+        )
+
+
 def set_drum_position(
     plant: MultibodyPlant, context: Context, xy: ArrayLike
 ) -> None:
@@ -508,14 +533,7 @@ def set_drum_position(
         InputError: if the drum would not stand wholly on the table.
     """
     place = require_array("drum position", xy, (2,))
-    low, high = drum_limits(plant, context)
-    require(
-        bool(np.all(place >= low) and np.all(place <= high)),
-        "drum position",
-        place.tolist(),
-        f"x from {low[0]:.3f} to {high[0]:.3f} and y from {low[1]:.3f} to "
-        f"{high[1]:.3f} m (the drum stands wholly on the table)",
-    )
+    require_on_table(plant, context, "drum position", place)
     frame = plant.GetFrameByName(
         _PLACEMENT, plant.world_body().model_instance()
     )
@@ -538,10 +556,7 @@ def set_mirror_pose(
     """
     pose.check("mirror")
     frame: Any = plant.GetFrameByName(_MIRROR)
-    rotation = RollPitchYaw(np.radians(pose.rotation))
-    frame.SetPoseInParentFrame(
-        context, RigidTransform(rotation, pose.translation)
-    )
+    frame.SetPoseInParentFrame(context, pose.transform())
 
 
 def get_mirror_pose(plant: MultibodyPlant, context: Context) -> FramePose:

@@ -16,7 +16,12 @@ from pydrake.systems.analysis import (
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from drake_affetto.common.errors import InputError, require, require_range
+from drake_affetto.common.errors import (
+    InputError,
+    one_line,
+    require,
+    require_range,
+)
 
 LONGEST_STEP = 5e-3
 """The longest step of the plant, s. Up to it outcomes are those of a step of
@@ -92,7 +97,7 @@ def _ask_drake(ask: Any, config: Any, default: Any, where: str) -> None:
         return
     except RuntimeError as error:
         # It may repeat a long value.
-        reason = " ".join(str(error).split())[:200]
+        reason = one_line(error)[:200]
     for field in type(config).__fields__:
         usual, value = getattr(default, field.name), getattr(config, field.name)
         setattr(default, field.name, value)

@@ -6,7 +6,6 @@
 import os
 from typing import Protocol
 
-import numpy as np
 from pydrake.multibody.plant import (
     AddMultibodyPlant,
     MultibodyPlant,
@@ -55,11 +54,16 @@ _FITTING: set[str] = set()
 def check_models_once(scenario: ModelScenario, where: str) -> None:
     """As `check_models`, but at once where the same has been found to fit.
 
-    The same are all values, and the files that they name as far as their
-    times and sizes tell. A model that one of those files includes may have
-    changed: whoever builds the station finds out then.
+    The same are the values that models have to fit, and the files that they
+    name as far as their times and sizes tell. A model that one of those files
+    includes may have changed: whoever builds the station finds out then.
     """
-    values = config_values(scenario)
+    values = config_values(
+        {
+            name: getattr(scenario, name)
+            for name in ModelScenario.__annotations__
+        }
+    )
     files = [
         (leaf, stat.st_mtime_ns, stat.st_size)
         for leaf in leaves(values)
@@ -158,16 +162,9 @@ def check_scene(
     """
     root = Diagram.CreateDefaultContext(diagram)
     context = plant.GetMyContextFromRoot(root)
-    low, high = world.drum_limits(plant, context)
-    on_table = (
-        f"x from {low[0]:.3f} to {high[0]:.3f} and y from {low[1]:.3f} to "
-        f"{high[1]:.3f} m (the drum stands wholly on the table)"
-    )
     region = scenario.drum_region
     field = f"{where}.drum_region" + (".polygon" if region.polygon else "")
-    for corner in region.corners:
-        fits = bool(np.all(corner >= low) and np.all(corner <= high))
-        require(fits, field, corner.tolist(), on_table)
+    world.require_on_table(plant, context, field, *region.corners)
     chain = world.serial_chain(plant, scenario.camera.frame)
     name = scenario.yaw_joint
     expected = "an active joint that turns the camera about a vertical axis"

@@ -32,6 +32,7 @@ import drake_affetto
 from drake_affetto.common.csv_columns import read_columns
 from drake_affetto.common.errors import (
     InputError,
+    naming,
     require,
     require_array,
     require_file,
@@ -330,7 +331,7 @@ def from_robot_csv(
         require_between(path, column, data, low, high, "% of the range")
     table = np.stack(list(data.values()), axis=1)
     lower, upper = np.array([tuple(pair) for pair in limits.values()]).T
-    try:
+    with naming(str(path)):
         return Demonstration(
             t=table[:, 0] - table[0, 0],
             q=lower + table[:, 1:] / 100.0 * (upper - lower),
@@ -338,8 +339,6 @@ def from_robot_csv(
             drum_xy=None if drum_xy is None else np.asarray(drum_xy),
             scenario=path.name,
         )
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 @contextlib.contextmanager

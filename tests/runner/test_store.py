@@ -298,6 +298,17 @@ def test_damage_is_told_by_every_way_of_reading(tmp_path):
                 read()
 
 
+@pytest.mark.parametrize("value", [None, b"x"])
+def test_a_key_that_is_no_text_is_told(tmp_path, value):
+    path = tmp_path / "a.sqlite"
+    filled(path)
+    with TrialStore(path) as store:
+        store._db.execute("UPDATE trials SET key = ? WHERE rowid = 1", (value,))
+        for read in (store.verify, lambda: list(store.rows())):
+            with pytest.raises(InputError, match=r"key is .*, expected a text"):
+                read()
+
+
 def test_entries_with_an_at_sign_are_kept_but_determine_nothing(tmp_path):
     here = spec(scenario={"@name": "here.yaml", "values": "1"})
     there = spec(scenario={"@name": "there.yaml", "values": "1"})

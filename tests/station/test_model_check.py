@@ -48,6 +48,10 @@ def test_the_models_are_read_again_when_a_file_has_changed(
     assert len(asked) == 2
     check_models_once(dataclasses.replace(scenario, yaw_joint="x"), "mine")
     assert len(asked) == 3
+    # What no model has to fit is no reason.
+    skill = dataclasses.replace(scenario.skill, alpha=0.5)
+    check_models_once(dataclasses.replace(scenario, skill=skill), "mine")
+    assert len(asked) == 3
 
 
 def test_what_does_not_fit_is_never_taken_as_known():

@@ -129,7 +129,7 @@ class HandLookResult:
     """
 
     KIND: ClassVar[str] = "hand_look"
-    ARRAYS: ClassVar[tuple[str, ...]] = ()
+    ARRAYS: ClassVar[dict[str, int]] = {}
 
     readings: list[float]
     pixel: list[float] | None
@@ -148,7 +148,7 @@ class EllipseLookResult:
     """
 
     KIND: ClassVar[str] = "ellipse_look"
-    ARRAYS: ClassVar[tuple[str, ...]] = ()
+    ARRAYS: ClassVar[dict[str, int]] = {}
 
     found: bool
     tau: list[float]

@@ -14,8 +14,7 @@ from drake_affetto.report.report_data import ReportData
 _SCHEME = "transfer_default"
 _GOAL = 0.9
 _DRUM_GOAL = 0.95
-# A rank correlation over these many bodies that is beyond chance at 5 %, each
-# number for itself: of 47 numbers two or three are, whatever the truth.
+# So many of the numbers that depart are told: those that go with success most.
 _TOLD = 6
 
 
