@@ -120,6 +120,10 @@ def test_it_stands_beside_the_schemes_with_demonstrations(tmp_path):
     assert {"mirror", "self_calibration"} <= set(made.sections())
     alone = make(tmp_path / "alone", by_itself=results())
     assert "mirror" not in alone.sections()
+    assert "Affetto finds the mirror by itself" in alone.text
+    # The headline numbers.
+    assert "without a demonstration, by its hand in the mirror" in alone.text
+    assert "of mirrors turned by 5° noticed" in alone.text
 
 
 def test_its_replay_waits_until_it_is_asked_for(tmp_path):

@@ -6,7 +6,6 @@ from drake_affetto.experiments.results.self_calibration import (
 )
 from drake_affetto.report import wording
 from drake_affetto.report.charts.self_calibration import (
-    METHODS,
     demonstrations_needed,
     shrinking_belief,
 )
@@ -56,7 +55,7 @@ def _table(found: SelfCalibrationResults) -> Table:
         ("by", "success", "looks", "own strokes", "plane off by", "covered"),
         [
             [
-                METHODS.get(name, name),
+                wording.METHODS.get(name, name),
                 wording.rate(method.success_rate),
                 f"{method.looks:.1f}",
                 f"{method.strokes:.0f}",
