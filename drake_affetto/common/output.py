@@ -58,6 +58,27 @@ def prepare_output(path: str | Path) -> Path:
     return folder
 
 
+@contextlib.contextmanager
+def output_folder(path: str | Path) -> Iterator[Path]:
+    """The folder `path`, made with its parents, for a block that checks more.
+
+    Where the block raises InputError, folders that were made for it and are
+    empty do not stay.
+
+    Raises:
+        InputError: if it cannot be made or written.
+    """
+    wanted = Path(path).expanduser()
+    missing = [p for p in (wanted, *wanted.parents) if not p.exists()]
+    try:
+        yield prepare_output(path)
+    except InputError:
+        for each in missing:
+            with contextlib.suppress(OSError):
+                each.rmdir()
+        raise
+
+
 def write_target(path: str | Path) -> Path:
     """The file that is written where `path` is: a symbolic link's target."""
     path = Path(path)

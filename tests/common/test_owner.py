@@ -7,7 +7,12 @@ import pytest
 
 from drake_affetto.cli.main import main
 from drake_affetto.common.errors import InputError
-from drake_affetto.common.owner import MARK, claim_file, claim_folder
+from drake_affetto.common.owner import (
+    MARK,
+    check_file,
+    claim_file,
+    claim_folder,
+)
 
 
 def test_a_folder_belongs_to_who_made_it(tmp_path):
@@ -115,3 +120,16 @@ def test_a_command_refuses_anothers_folder_in_one_line(tmp_path, capsys):
         "start.dot",
         MARK,
     }
+
+
+def test_a_look_whether_a_file_may_be_written_leaves_no_trace(tmp_path):
+    folder = tmp_path / "drum"
+    assert check_file(folder / "table.csv", "export") == folder / "table.csv"
+    assert not folder.exists()
+    claim_folder(folder, "drum")
+    (folder / "replay.html").touch()
+    before = (folder / MARK).read_bytes()
+    check_file(folder / "table.csv", "export")
+    with pytest.raises(InputError, match="`affetto drum` made; name"):
+        check_file(folder / "replay.html", "export")
+    assert (folder / MARK).read_bytes() == before
