@@ -10,7 +10,9 @@ import json
 import math
 import os
 from pathlib import Path
+import re
 import secrets
+import time
 from typing import Any
 
 from drake_affetto.common.errors import InputError
@@ -164,6 +166,24 @@ def _sibling(path: Path) -> Path:
     """A new, hidden name beside `path`, with its suffix."""
     token = secrets.token_hex(4)
     return path.with_name(f".{path.stem[:100]}.{token}{path.suffix}")
+
+
+_SIBLING = re.compile(r"\..+\.[0-9a-f]{8}(\.[^.]*)?")
+
+# A writer that is at work has touched its file since, s.
+_LONG_AGO = 3600.0
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Removes from a folder of results what killed writers have left in it.
+
+    What may be written at this moment, by another command, stays.
+    """
+    for path in folder.glob(".*"):
+        with contextlib.suppress(OSError):
+            old = time.time() - path.lstat().st_mtime > _LONG_AGO
+            if old and _SIBLING.fullmatch(path.name) and path.is_file():
+                path.unlink()
 
 
 def _reason(error: Exception) -> str:

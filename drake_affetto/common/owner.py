@@ -14,6 +14,7 @@ from typing import Any
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.output import (
     prepare_output,
+    remove_leftovers,
     write_json,
     write_target,
 )
@@ -52,6 +53,7 @@ def claim_folder(path: str | Path, command: str) -> Path:
         raise InputError(
             f"--out: {path} holds what {_said(owner)} made; name another folder"
         )
+    remove_leftovers(folder)
     return folder
 
 

@@ -19,13 +19,20 @@ from drake_affetto.geometry.planes import normals, plane_parameters
 from drake_affetto.perception.camera_model import Mirror
 from drake_affetto.scene import world
 from drake_affetto.scene.world import FramePose
+from drake_affetto.station.content import Content, scenario_content
 
 # So many mirrors are set up before it is given up.
 _TRIES = 500
 
 
-@functools.cache
 def _view(scenario: str) -> ViewDomain:
+    """The view of a scenario as its files are now."""
+    return _view_of(scenario, scenario_content(scenario))
+
+
+# Each keeps a station: of the direct view and the one before the mirror.
+@functools.lru_cache(maxsize=2)
+def _view_of(scenario: str, _: Content) -> ViewDomain:
     return ViewDomain.of(scenario)
 
 

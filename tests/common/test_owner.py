@@ -1,7 +1,9 @@
 """No command overwrites what another one made."""
 
 import json
+import os
 from pathlib import Path
+import time
 
 import pytest
 
@@ -133,3 +135,18 @@ def test_a_look_whether_a_file_may_be_written_leaves_no_trace(tmp_path):
     with pytest.raises(InputError, match="`affetto drum` made; name"):
         check_file(folder / "replay.html", "export")
     assert (folder / MARK).read_bytes() == before
+
+
+def test_what_killed_writers_left_goes_with_time(tmp_path):
+    claim_folder(tmp_path, "drum")
+    ago = time.time() - 86400.0
+    names = (".trial.3f14695c.png", ".trial.3f14695d.png", ".trial.png")
+    for name in (*names, "trial.3f14695c.png"):
+        (tmp_path / name).touch()
+        # The second may be written at this moment.
+        if name != names[1]:
+            os.utime(tmp_path / name, (ago, ago))
+    os.utime(tmp_path / MARK, (ago, ago))
+    claim_folder(tmp_path, "drum")
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left == {MARK, *names[1:], "trial.3f14695c.png"}

@@ -27,6 +27,8 @@ import tempfile
 import time
 from typing import Any
 
+import h5py
+
 from drake_affetto.common.errors import InputError
 from drake_affetto.teaching.demonstrations import read_demonstrations
 
@@ -85,12 +87,25 @@ def query(path: Path, text: str) -> list[tuple]:
     with contextlib.closing(
         sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)
     ) as database:
-        try:
-            return database.execute(text).fetchall()
-        except sqlite3.OperationalError as error:
-            if "no such table" in str(error):
-                return []
-            raise
+        return database.execute(text).fetchall()
+
+
+def count_rows(path: Path, text: str) -> int:
+    """What a query counts; 0 if the file is about to be made or removed."""
+    try:
+        found = query(path, text)
+    except sqlite3.OperationalError:
+        return 0
+    return int(found[0][0]) if found else 0
+
+
+def count_taught(path: Path) -> int:
+    """The demonstrations of a file, which is replaced as a whole."""
+    try:
+        with h5py.File(path, "r") as file:
+            return len(file["demonstrations"])
+    except OSError:
+        return 0
 
 
 def stored_trials(path: Path) -> Rows:
@@ -157,7 +172,8 @@ class Job:
         name: Its name.
         words: Words of the command line; "{out}" is where it writes.
         store: File of its finished trials, from there.
-        count: Query that counts them while the command runs.
+        stored: How many they are, while the command runs, of the place where
+            it writes.
         rows: What is finished, of the place where it writes.
         final: What must be equal at the end, of the same place.
         results: File that is written last, from there.
@@ -167,7 +183,9 @@ class Job:
     name: str
     words: str
     store: str = "trials.sqlite"
-    count: str = "SELECT count(*) FROM trials"
+    stored: Callable[[Path], int] = lambda out: count_rows(
+        out / "trials.sqlite", "SELECT count(*) FROM trials"
+    )
     rows: Callable[[Path], Rows] = lambda out: stored_trials(
         out / "trials.sqlite"
     )
@@ -180,16 +198,8 @@ class Job:
     def command(self, out: Path, workers: int) -> list[str]:
         """The command line."""
         words = [word.format(out=out) for word in self.words.split()]
-        if workers != 1:
-            words += ["--workers", str(workers)]
-        else:
-            words += ["--workers", "1"]
+        words += ["--workers", str(workers)]
         return [sys.executable, *self.program, *words]
-
-    def stored(self, out: Path) -> int:
-        """How many trials are finished, while the command runs."""
-        found = query(out / self.store, self.count)
-        return int(found[0][0]) if found else 0
 
 
 def _taught_file(out: Path) -> Rows:
@@ -237,6 +247,7 @@ JOBS = {
             "teach --demonstrations 10 --scenario direct.yaml "
             "--out {out}/lessons.h5",
             store="lessons.h5.trials.sqlite",
+            stored=lambda out: count_taught(out / "lessons.h5"),
             rows=_taught_file,
             final=lambda out: taught(out / "lessons.h5"),
             results="lessons.h5",
@@ -247,8 +258,11 @@ JOBS = {
             "tune --joints right_elbow_flexion --tuning short.yaml "
             "--trials 20 --out {out}",
             store="study.sqlite",
-            count="SELECT count(*) FROM trials "
-            "WHERE state IN ('COMPLETE', 'PRUNED')",
+            stored=lambda out: count_rows(
+                out / "study.sqlite",
+                "SELECT count(*) FROM trials "
+                "WHERE state IN ('COMPLETE', 'PRUNED')",
+            ),
             rows=_tuned_rows,
             final=_tuned_results,
         ),
@@ -327,11 +341,21 @@ class Running:
         out: Path,
         workers: int = 1,
         more: dict[str, str] | None = None,
+        logs: Path | None = None,
     ) -> None:
-        """Starts it in the folder of the results' folder."""
+        """Starts it.
+
+        Args:
+            job: The command.
+            out: Where it writes; it runs in the folder above.
+            workers: Number of its worker processes.
+            more: Variables of its environment.
+            logs: Folder of what it prints; None for the folder above.
+        """
         self.job, self.out = job, out
-        self.log = out.parent / f"{out.name}.log"
-        self.errors = out.parent / f"{out.name}.err"
+        logs = logs or out.parent
+        self.log = logs / f"{out.name}.log"
+        self.errors = logs / f"{out.name}.err"
         # A group of its own, without a terminal.
         with self.log.open("ab") as log, self.errors.open("wb") as errors:
             self.process = subprocess.Popen(
@@ -499,11 +523,7 @@ def one_life(
         stored = job.stored(out)
         # Not in the start-up: that holds little.
         if running.wait_until(
-            lambda: (
-                job.stored(out) > stored
-                or job.stored(out) >= course.total
-                or (out / job.results).exists()
-            ),
+            lambda: job.stored(out) > stored or job.stored(out) >= course.total,
             0.01,
         ):
             whole = course.last - course.first
