@@ -30,6 +30,7 @@ from typing import Any
 import h5py
 
 from drake_affetto.common.errors import InputError
+from drake_affetto.runner.store import TrialStore
 from drake_affetto.teaching.demonstrations import read_demonstrations
 
 ROOT = Path(__file__).parents[2]
@@ -203,10 +204,26 @@ class Job:
 
 
 def _taught_file(out: Path) -> Rows:
-    return {
-        **stored_trials(out / "lessons.h5.trials.sqlite"),
-        **taught(out / "lessons.h5"),
-    }
+    """The movements that were taught, by their seeds.
+
+    Each is kept beside the file until it is in the file.
+    """
+    beside = out / "lessons.h5.trials.sqlite"
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        if beside.exists():
+            copy = copy_database(beside, Path(folder))
+            with TrialStore(copy) as store:
+                for row in store.rows():
+                    _, arrays = store.get(row.spec) or ({}, {})
+                    if row.result["success"]:
+                        theta = arrays["theta"].tobytes()
+                        found[str(row.spec["seed"])] = theta
+    path = out / "lessons.h5"
+    for each in read_demonstrations(path) if path.exists() else []:
+        assert each.theta is not None
+        found[str(each.seed)] = each.theta.tobytes()
+    return found
 
 
 def _tuned_results(out: Path) -> Any:
@@ -497,8 +514,7 @@ def require_end(running: Running, before: Rows, course: Course) -> None:
     code = running.process.wait()
     if code != 0:
         raise LostError(f"exit code {code}: {running.told()[-500:]}")
-    if job.store != "lessons.h5.trials.sqlite":
-        require_kept(before, job.rows(out), "at the end")
+    require_kept(before, job.rows(out), "at the end")
     if job.final(out) != course.final:
         raise LostError(f"{out / job.results} differs from an undisturbed run")
 

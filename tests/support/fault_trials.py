@@ -179,7 +179,7 @@ def two_at_once(job: Job, folder: Path, course: Course) -> str:
                 require_told(each, "at work")
             else:
                 require_end(each, {}, course)
-        told.append("both ended well" if codes[second] == 0 else "one refused")
+        told.append("one refused" if 2 in codes.values() else "both ended well")
         go_on(job, out, course, folder)
     return ", ".join(told)
 
