@@ -67,6 +67,12 @@ DRAKE_FREE = {
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 
+@functools.cache
+def parsed(path: Path) -> ast.Module:
+    """The syntax of a file; nothing here changes it."""
+    return ast.parse(path.read_text())
+
+
 def module_name(path: Path) -> str:
     parts = path.relative_to(ROOT).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
@@ -109,7 +115,7 @@ def test_imports_run_one_way(path):
     if path == PACKAGE / "__init__.py":
         # The package's own face names what it imports when it is used.
         return
-    for module in imports(ast.parse(path.read_text()), top_only=False):
+    for module in imports(parsed(path), top_only=False):
         if module.split(".")[0] != "drake_affetto":
             assert module != "pydrake.all", "name what is needed"
             continue
@@ -125,7 +131,7 @@ def import_graph() -> dict[str, set[str]]:
     graph = {}
     for path in MODULES:
         wanted = set()
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(parsed(path)):
             if isinstance(node, ast.Import):
                 wanted |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
@@ -209,7 +215,7 @@ def test_picture_of_the_rooms_shows_the_imports():
 
 @pytest.mark.parametrize("path", MODULES, ids=module_name)
 def test_every_module_says_what_it_is(path):
-    assert ast.get_docstring(ast.parse(path.read_text()))
+    assert ast.get_docstring(parsed(path))
 
 
 def test_every_folder_with_code_is_a_package():
@@ -220,7 +226,7 @@ def test_every_folder_with_code_is_a_package():
 def test_mathematics_import_without_drake():
     modules = set(DRAKE_FREE)
     for path in MODULES:
-        top = set(imports(ast.parse(path.read_text()), top_only=True))
+        top = set(imports(parsed(path), top_only=True))
         drake = any(name.split(".")[0] == "pydrake" for name in top)
         # The world's mathematics are Drake's own; the stages after it have
         # theirs apart.
@@ -306,7 +312,7 @@ def body_length(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
 @pytest.mark.parametrize("path", MODULES, ids=module_name)
 def test_functions_are_short_or_compiled_or_say_why_not(path):
     long = []
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(parsed(path)):
         if not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             continue
         compiled = any("njit" in ast.unparse(d) for d in node.decorator_list)
@@ -446,15 +452,14 @@ def own_test(module: str) -> str:
 
 def has_code(path: Path) -> bool:
     kinds = (ast.FunctionDef, ast.ClassDef)
-    return any(
-        isinstance(node, kinds) for node in ast.parse(path.read_text()).body
-    )
+    return any(isinstance(node, kinds) for node in parsed(path).body)
 
 
+@functools.cache
 def imported_names(path: Path) -> set[str]:
     """Modules that a file imports, and what it imports from them."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.ImportFrom) and node.module is not None:
             found.add(node.module)
             found |= {f"{node.module}.{alias.name}" for alias in node.names}
@@ -483,6 +488,7 @@ def reached(test: Path) -> set[str]:
     return found
 
 
+@functools.cache
 def modules_with_code() -> dict[str, Path]:
     """Those that have something to test, as "skill/elm"."""
     return {
@@ -492,6 +498,7 @@ def modules_with_code() -> dict[str, Path]:
     }
 
 
+@functools.cache
 def untested_in(entry: str) -> list[str]:
     """Modules without a file of tests that a module or folder stands for."""
     return [

@@ -103,6 +103,7 @@ def test_a_seed_gives_the_same_damage(tmp_path):
         (lambda path: refuse(f"{path}: {'x' * 2000}"), "failed"),
         (lambda path: {}["key"], "failed"),
         (lambda path: sys.exit(3), "failed"),
+        (lambda path: np.float64(1e308) * 10.0, "failed"),
     ],
 )
 def test_ends_are_told_apart(read, end, tmp_path):

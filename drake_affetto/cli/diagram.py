@@ -5,7 +5,7 @@ from pathlib import Path
 
 from drake_affetto.cli.options import add_scenario_argument, whole_number
 from drake_affetto.common.errors import require
-from drake_affetto.common.owner import claim_file
+from drake_affetto.common.owner import check_file, claim_file
 from drake_affetto.station.diagram_drawing import check_suffix, write_diagram
 
 
@@ -42,8 +42,9 @@ def run(args: argparse.Namespace) -> int:
     from drake_affetto.station.station import AffettoStation
 
     scenario = load_scenario(args.scenario)
-    claim_file(path, "diagram")
+    check_file(path, "diagram")
     station = AffettoStation(scenario)
+    claim_file(path, "diagram")
     write_diagram(station, path, args.depth, all_ports=args.all_ports)
     print(path)
     return 0

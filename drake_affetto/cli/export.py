@@ -5,7 +5,7 @@ from pathlib import Path
 
 from drake_affetto.cli.options import STORE
 from drake_affetto.common.errors import InputError
-from drake_affetto.common.owner import claim_file
+from drake_affetto.common.owner import check_file, claim_file
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,13 +38,17 @@ def run(args: argparse.Namespace) -> int:
         from drake_affetto.experiments import signals
 
         signals.check_suffix(args.to)
+        check_file(args.to, "export")
+        found = signals.read_signals(args.folder, args.trial)
         claim_file(args.to, "export")
-        signals.read_signals(args.folder, args.trial).save(args.to)
+        found.save(args.to)
     else:
         from drake_affetto.experiments import tables
 
         tables.check_suffix(args.to)
+        check_file(args.to, "export")
+        table = tables.read_trials(args.folder)
         claim_file(args.to, "export")
-        tables.write_trials(args.to, tables.read_trials(args.folder))
+        tables.write_trials(args.to, table)
     print(args.to)
     return 0

@@ -3,7 +3,6 @@
 import argparse
 from pathlib import Path
 
-from drake_affetto.common.owner import claim_file
 from drake_affetto.report import write_report
 
 
@@ -31,9 +30,7 @@ def run(args: argparse.Namespace) -> int:
         InputError: if a folder does not fit or the page cannot be written.
     """
     path = args.out or args.folders[0] / "report.html"
-    if path.expanduser().parent.is_dir():
-        claim_file(path, "report")
-    written = write_report(args.folders, path)
+    written = write_report(args.folders, path, "report")
     size = written.stat().st_size / 1e6
     print(f"{written} ({size:.1f} MB): open it in a browser")
     return 0

@@ -13,6 +13,7 @@ from drake_affetto.cli.study_command import (
 )
 from drake_affetto.common.errors import require
 from drake_affetto.common.folder_lock import lock_file
+from drake_affetto.common.output import output_folder, write_target
 from drake_affetto.common.owner import claim_file
 from drake_affetto.experiments.plans import TeachPlan
 
@@ -45,10 +46,13 @@ class TeachCommand(StudyCommand[TeachPlan]):
         self, plan: TeachPlan, args: argparse.Namespace, console: Any
     ) -> int:
         """Teaches at the positions that the file does not have."""
+        require(bool(args.out), "--out", args.out, "the name of a file")
+        folder = write_target(Path(args.out).expanduser()).parent
         # Before the imports: the second of two commands is told at once.
-        path = demonstrations_file(args.out)
-        with lock_file(path, "affetto teach"):
-            return self._teach(plan, path, args, console)
+        with output_folder(folder):
+            path = demonstrations_file(args.out)
+            with lock_file(path, "affetto teach"):
+                return self._teach(plan, path, args, console)
 
     def _teach(
         self,

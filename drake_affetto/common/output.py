@@ -10,7 +10,9 @@ import json
 import math
 import os
 from pathlib import Path
+import re
 import secrets
+import time
 from typing import Any
 
 from drake_affetto.common.errors import InputError
@@ -56,6 +58,27 @@ def prepare_output(path: str | Path) -> Path:
             f"the output folder {path} cannot be written: {_reason(error)}"
         ) from error
     return folder
+
+
+@contextlib.contextmanager
+def output_folder(path: str | Path) -> Iterator[Path]:
+    """The folder `path`, made with its parents, for a block that checks more.
+
+    Where the block raises InputError, folders that were made for it and are
+    empty do not stay.
+
+    Raises:
+        InputError: if it cannot be made or written.
+    """
+    wanted = Path(path).expanduser()
+    missing = [p for p in (wanted, *wanted.parents) if not p.exists()]
+    try:
+        yield prepare_output(path)
+    except InputError:
+        for each in missing:
+            with contextlib.suppress(OSError):
+                each.rmdir()
+        raise
 
 
 def write_target(path: str | Path) -> Path:
@@ -143,6 +166,24 @@ def _sibling(path: Path) -> Path:
     """A new, hidden name beside `path`, with its suffix."""
     token = secrets.token_hex(4)
     return path.with_name(f".{path.stem[:100]}.{token}{path.suffix}")
+
+
+_SIBLING = re.compile(r"\..+\.[0-9a-f]{8}(\.[^.]*)?")
+
+# A writer that is at work has touched its file since, s.
+_LONG_AGO = 3600.0
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Removes from a folder of results what killed writers have left in it.
+
+    What may be written at this moment, by another command, stays.
+    """
+    for path in folder.glob(".*"):
+        with contextlib.suppress(OSError):
+            old = time.time() - path.lstat().st_mtime > _LONG_AGO
+            if old and _SIBLING.fullmatch(path.name) and path.is_file():
+                path.unlink()
 
 
 def _reason(error: Exception) -> str:

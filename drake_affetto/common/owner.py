@@ -14,6 +14,7 @@ from typing import Any
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.output import (
     prepare_output,
+    remove_leftovers,
     write_json,
     write_target,
 )
@@ -52,7 +53,31 @@ def claim_folder(path: str | Path, command: str) -> Path:
         raise InputError(
             f"--out: {path} holds what {_said(owner)} made; name another folder"
         )
+    remove_leftovers(folder)
     return folder
+
+
+def check_file(path: str | Path, command: str) -> Path:
+    """Sees whether a command may write a file, and leaves no trace of it.
+
+    For work that may find its input unfit before it writes anything.
+
+    Args:
+        path: The file.
+        command: Name of the command, such as "export".
+
+    Returns:
+        The file, with a leading `~` expanded.
+
+    Raises:
+        InputError: If it is a folder, or another command made the file as a
+            part of its results.
+    """
+    path = Path(path).expanduser()
+    if not path.name or path.is_dir():
+        raise InputError(f"{path} is a folder, expected the name of a file")
+    _check_maker(path, _read_mark(write_target(path).parent), command)
+    return path
 
 
 def claim_file(path: str | Path, command: str) -> Path:
@@ -69,25 +94,35 @@ def claim_file(path: str | Path, command: str) -> Path:
         InputError: If it is a folder, another command made the file as a part
             of its results, or its folder cannot be written.
     """
-    path = Path(path).expanduser()
-    if not path.name or path.is_dir():
-        raise InputError(f"{path} is a folder, expected the name of a file")
+    path = check_file(path, command)
     target = write_target(path)
     prepare_output(target.parent)
     mark = _read_mark(target.parent)
+    if mark.get("command") is None:
+        return path
+    if _check_maker(path, mark, command) != command:
+        mark["files"] = {**mark.get("files", {}), target.name: command}
+        write_json(target.parent / MARK, mark)
+    return path
+
+
+def _check_maker(path: Path, mark: dict[str, Any], command: str) -> str | None:
+    """The command that is known to make the file, if any is.
+
+    Raises:
+        InputError: If it is another one's.
+    """
     owner = mark.get("command")
     if owner is None:
-        return path
+        return None
+    target = write_target(path)
     files = {**_GUESTS, **mark.get("files", {})}
     maker = files.get(target.name, owner)
     if target.exists() and maker != command:
         raise InputError(
             f"{path} is a file that {_said(maker)} made; name another file"
         )
-    if files.get(target.name) != command:
-        mark["files"] = {**mark.get("files", {}), target.name: command}
-        write_json(target.parent / MARK, mark)
-    return path
+    return files.get(target.name)
 
 
 def _said(command: str) -> str:

@@ -4,6 +4,7 @@ Importing it imports Drake, as `scalars` does and no other module of this room.
 """
 
 from collections.abc import Callable
+import gc
 from typing import Any, cast
 import weakref
 
@@ -103,6 +104,28 @@ def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
         return bound(*args)
 
     return call
+
+
+# Diagrams that somebody uses, or that wait to be collected.
+_DIAGRAMS: weakref.WeakSet[Any] = weakref.WeakSet()
+
+# So many of them may wait: a collection takes a tenth of a second.
+_MOST_WAITING = 4
+
+
+def make_room_for(diagram: Any) -> None:
+    """Frees the diagrams that nobody uses, before another one is built.
+
+    A diagram and its systems refer to each other in a circle. Python collects
+    circles by their number, and sees nothing of the tens of MiB that Drake
+    keeps behind each: a process that builds one after the other grows.
+
+    Args:
+        diagram: Diagram that is about to be built.
+    """
+    if len(_DIAGRAMS) >= _MOST_WAITING:
+        gc.collect()
+    _DIAGRAMS.add(diagram)
 
 
 class _Getter:

@@ -304,9 +304,17 @@ def _fit_schemes(
     """
     tau = task_parameters(samples)
     theta = np.array([each.theta for each in samples])
+    loaded = load_scenario(plan.scenario)
     return {
         name: fit_scheme(
-            name, skill, tau, theta, plan.scenario, plan.direct, knowledge
+            name,
+            skill,
+            tau,
+            theta,
+            plan.scenario,
+            plan.direct,
+            knowledge,
+            loaded,
         )
         for name in plan.schemes
     }

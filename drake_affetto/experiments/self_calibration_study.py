@@ -63,7 +63,7 @@ _TEST, _SAMPLES = range(300, 302)
 _BODIES = 307
 
 # Repeats of own bodies that run side by side: workers keep so many stations.
-_TOGETHER = 5
+_TOGETHER = 3
 
 # Half the length of a mirror's line in a picture, m.
 _REACH = 0.3

@@ -280,6 +280,7 @@ def fit_scheme(
     scenario: str,
     direct: str,
     seed: int = 0,
+    loaded: Scenario | None = None,
 ) -> Any:
     """One scheme of the paper's comparison, fitted to what is new.
 
@@ -291,6 +292,7 @@ def fit_scheme(
         scenario: of the new condition, by name or path.
         direct: in which the skill was learned, by name or path.
         seed: of the errors with which the optical map knows the camera.
+        loaded: the scenario of the new condition, if it is loaded already.
 
     Returns:
         A fitted regressor from τ̂ to θ.
@@ -298,7 +300,7 @@ def fit_scheme(
     Raises:
         ValueError: for another name.
     """
-    loaded = load_scenario(scenario)
+    loaded = loaded or load_scenario(scenario)
     parameters: dict[str, Any] = {}
     if name == "transfer_default":
         parameters = {

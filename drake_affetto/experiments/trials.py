@@ -65,9 +65,10 @@ from drake_affetto.station.scenario import Scenario, load_scenario
 # it, what led to the scenario.
 _RUNNERS: dict[Content, tuple[str, TrialRunner]] = {}
 
-# Each keeps a Diagram with its renderers, 36 MiB. A study of many bodies goes
-# from one to the next and does not come back; others have two scenarios.
-_MOST_RUNNERS = 6
+# Each keeps a Diagram with its renderers, some 50 MiB, after trials twice that.
+# A study of many bodies goes from one to the next and does not come back;
+# others have two scenarios.
+_MOST_RUNNERS = 4
 
 NAME = "@name"
 """Entry of a spec's scenario that says what leads to it."""
@@ -103,16 +104,17 @@ def runner_of(entry: Mapping[str, Any]) -> TrialRunner:
     content = check_entry(entry, loaded=_RUNNERS)
     if content not in _RUNNERS:
         name = entry[NAME]
-        built = TrialRunner(load_scenario(name))
-        # It may have been edited while it was read.
-        check_entry(entry)
+        loaded = load_scenario(name)
         for old, (source, _) in list(_RUNNERS.items()):
             # What its files held before is not asked for again.
             if source == name:
                 del _RUNNERS[old]
-        # The least recently built of too many goes.
+        # The least recently built of too many goes, before there is one more.
         while len(_RUNNERS) >= _MOST_RUNNERS:
             del _RUNNERS[next(iter(_RUNNERS))]
+        built = TrialRunner(loaded)
+        # It may have been edited while it was read.
+        check_entry(entry)
         _RUNNERS[content] = name, built
     return _RUNNERS[content][1]
 

@@ -10,6 +10,7 @@ import zlib
 import numpy as np
 
 from drake_affetto.common.errors import InputError, one_line, require
+from drake_affetto.common.stored_size import greatest_size
 
 # What reading an archive of arrays may raise where it is damaged.
 _DAMAGE = (
@@ -25,10 +26,6 @@ _DAMAGE = (
     zipfile.BadZipFile,
     zlib.error,
 )
-
-# By how much zlib can shrink what it packs, and a little for small files.
-_GREATEST_RATIO = 1100
-_SMALL = 4096
 
 
 def pack_arrays(arrays: Mapping[str, np.ndarray]) -> bytes:
@@ -48,7 +45,7 @@ def unpack_arrays(data: bytes) -> dict[str, np.ndarray]:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             for member in archive.infolist():
-                room = _GREATEST_RATIO * member.compress_size + _SMALL
+                room = greatest_size(member.compress_size)
                 with archive.open(member) as file:
                     size = _declared_size(file)
                 require(

@@ -23,6 +23,7 @@ from drake_affetto.common.errors import InputError, one_line, require
 from drake_affetto.common.fingerprint import text_digest
 from drake_affetto.common.nested import leaves, map_leaves
 from drake_affetto.runner.arrays import pack_arrays, unpack_arrays
+from drake_affetto.runner.read_only import ReadOnlyDatabase
 
 FORMAT_VERSION = 1
 """Version of the file's tables, increased when they change."""
@@ -184,11 +185,12 @@ class TrialStore:
         """
         self.path = Path(path)
         self._digests: bool | None = None
+        self._read: ReadOnlyDatabase | None = None
         verb = "read" if read_only else "keep"
         try:
             if read_only:
-                uri = f"{self.path.resolve().as_uri()}?mode=ro"
-                self._db = sqlite3.connect(uri, timeout=30.0, uri=True)
+                self._read = ReadOnlyDatabase(self.path)
+                self._db = self._read.connection
                 self._check_format("main", self.path)
                 self._db.execute("SELECT key FROM trials LIMIT 1")
                 return
@@ -204,7 +206,7 @@ class TrialStore:
                 self._db.execute(f"PRAGMA application_id = {_APPLICATION}")
                 self._db.execute(f"PRAGMA user_version = {FORMAT_VERSION}")
             self._db.commit()
-        except _DAMAGE as error:
+        except (*_DAMAGE, OSError) as error:
             raise InputError(
                 f"cannot {verb} trials in {self.path}: {one_line(error)}"
             ) from error
@@ -435,30 +437,35 @@ class TrialStore:
             raise InputError(f"no file of trials: {other}")
         with TrialStore(other, read_only=True) as checked:
             checked.verify()
-            columns = "key, kind, spec, result, arrays, finished_at"
-            if checked._has_digest():
-                columns += ", digest"
-        before = len(self)
-        try:
-            self._db.execute("ATTACH DATABASE ? AS other", (str(other),))
+            before = len(self)
             try:
-                with self._db:
-                    self._db.execute(
-                        f"INSERT OR IGNORE INTO trials ({columns}) "
-                        f"SELECT {columns} FROM other.trials"
-                    )
-                    if self._has_inputs("other"):
-                        self._db.execute(
-                            "INSERT OR IGNORE INTO inputs "
-                            "SELECT name, arrays FROM other.inputs"
-                        )
-            finally:
-                self._db.execute("DETACH DATABASE other")
-        except _DAMAGE as error:
-            raise InputError(
-                f"cannot take trials over from {other}: {one_line(error)}"
-            ) from error
+                self._take_over(checked)
+            except _DAMAGE as error:
+                raise InputError(
+                    f"cannot take trials over from {other}: {one_line(error)}"
+                ) from error
         return len(self) - before
+
+    def _take_over(self, other: "TrialStore") -> None:
+        """Copies the rows of an open store that this one has not."""
+        columns = "key, kind, spec, result, arrays, finished_at"
+        if other._has_digest():
+            columns += ", digest"
+        path = other.path if other._read is None else other._read.path
+        self._db.execute("ATTACH DATABASE ? AS other", (str(path),))
+        try:
+            with self._db:
+                self._db.execute(
+                    f"INSERT OR IGNORE INTO trials ({columns}) "
+                    f"SELECT {columns} FROM other.trials"
+                )
+                if self._has_inputs("other"):
+                    self._db.execute(
+                        "INSERT OR IGNORE INTO inputs "
+                        "SELECT name, arrays FROM other.inputs"
+                    )
+        finally:
+            self._db.execute("DETACH DATABASE other")
 
     def rows(self) -> Iterator[TrialRow]:
         """All finished trials, in the order in which they were finished.
@@ -564,7 +571,7 @@ class TrialStore:
 
     def close(self) -> None:
         """Closes the file."""
-        self._db.close()
+        (self._read or self._db).close()
 
     def __enter__(self) -> "TrialStore":
         return self

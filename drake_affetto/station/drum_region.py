@@ -51,7 +51,7 @@ class DrumRegion:
             return
         where = f"{where}.polygon"
         for i, corner in enumerate(self.polygon):
-            require_array(f"{where}[{i}]", corner, (2,))
+            require_array(f"{where}[{i}]", corner, (2,), low=-10.0, high=10.0)
         require(
             len(self.polygon) >= 3
             and bool(polygon_area(self.corners) > _LEAST_REGION)

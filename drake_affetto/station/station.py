@@ -29,7 +29,7 @@ from pydrake.systems.primitives import (
 from pydrake.systems.sensors import CameraInfo
 
 from drake_affetto.common.errors import require
-from drake_affetto.common.systems import connect, export
+from drake_affetto.common.systems import connect, export, make_room_for
 from drake_affetto.control.gravity_feedforward import GravityFeedforward
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.motion.dmp_source import DmpSource
@@ -151,6 +151,7 @@ class AffettoStation(Diagram):
                 this version of Drake has no mouse spring.
         """
         super().__init__()
+        make_room_for(self)
         scenario.check()
         require(
             meshcat is not None or not by_mouse,

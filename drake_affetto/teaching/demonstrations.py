@@ -43,6 +43,7 @@ from drake_affetto.common.log_limits import (
     require_times,
 )
 from drake_affetto.common.output import atomic_path, write_target
+from drake_affetto.common.stored_size import greatest_size
 from drake_affetto.common.typing import Array
 
 FORMAT = "drake_affetto demonstrations"
@@ -76,10 +77,6 @@ _DAMAGE = (
     TypeError,
     ValueError,
 )
-
-# By how much an array in a file can be greater than what is stored of it.
-_GREATEST_RATIO = 1100
-_SMALL = 4096
 
 # Unit and meaning of each array of `Demonstration`, as written to the file.
 _ARRAYS = {
@@ -452,7 +449,7 @@ def _array(group: h5py.Group, field: str) -> Any:
         isinstance(dataset, h5py.Dataset), field, type(dataset), "a dataset"
     )
     size = dataset.size * dataset.dtype.itemsize if dataset.shape else 0
-    room = _GREATEST_RATIO * dataset.id.get_storage_size() + _SMALL
+    room = greatest_size(dataset.id.get_storage_size())
     require(
         size <= room,
         field,

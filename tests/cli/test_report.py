@@ -23,3 +23,18 @@ def test_command(tmp_path, capsys):
     parser = argparse.ArgumentParser()
     command.add_arguments(parser)
     assert parser.parse_args(["a", "b"]).folders == [Path("a"), Path("b")]
+
+
+def test_a_damaged_study_is_refused_and_its_folder_left_as_it_was(
+    tmp_path, capsys
+):
+    folder = report_data.write(tmp_path / "toy", report_data.toy())
+    results = folder / "results.json"
+    results.write_text(results.read_text()[:-20])
+    before = sorted(folder.iterdir())
+    page = folder / "page.html"
+    assert cli.main(["report", str(folder), "--out", str(page)]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert str(results) in err
+    assert sorted(folder.iterdir()) == before

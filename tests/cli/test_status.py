@@ -106,7 +106,7 @@ if __name__ == "__main__":
     from drake_affetto.cli.main import main
     os.setpgrp()
     threading.Thread(target=ctrl_c, daemon=True).start()
-    sys.exit(main(["drum", "--out", sys.argv[2]]))
+    sys.exit(main(["drum", "--workers", "1", "--out", sys.argv[2]]))
 """
 
 

@@ -81,3 +81,13 @@ def test_what_is_no_file_is_refused(
     monkeypatch.chdir(tmp_path)
     assert teach(name) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_scenario_that_does_not_fit_leaves_no_folder(tmp_path, capsys):
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("extends: drumming\nsettling_duration: -1\n")
+    path = tmp_path / "new" / "taught.h5"
+    words = ["teach", "--out", str(path), "--scenario", str(bad)]
+    assert cli.main(words) == 2
+    assert "bad.settling_duration is -1" in capsys.readouterr().err
+    assert [each.name for each in tmp_path.iterdir()] == ["bad.yaml"]

@@ -12,6 +12,7 @@ from drake_affetto.common import output
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.output import (
     atomic_path,
+    output_folder,
     prepare_output,
     write_bytes_atomic,
     write_json,
@@ -212,3 +213,21 @@ class TestWriteJson:
         with pytest.raises(TypeError):
             write_json(tmp_path / "x.json", {"a": object()})
         assert names(tmp_path) == set()
+
+
+def test_a_folder_made_for_input_that_does_not_fit_goes_again(tmp_path):
+    (tmp_path / "there").mkdir()
+    for name, kept in (("new/deep", False), ("there", True)):
+        with pytest.raises(InputError, match="it is bad"):
+            refuse_in(tmp_path / name)
+        assert (tmp_path / name).is_dir() == kept
+    assert names(tmp_path) == {"there"}
+    with output_folder(tmp_path / "new/deep") as folder:
+        assert folder.is_dir()
+    assert folder.is_dir()
+
+
+def refuse_in(folder):
+    with output_folder(folder) as made:
+        assert made.is_dir()
+        raise InputError("it is bad")

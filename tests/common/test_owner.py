@@ -1,13 +1,20 @@
 """No command overwrites what another one made."""
 
 import json
+import os
 from pathlib import Path
+import time
 
 import pytest
 
 from drake_affetto.cli.main import main
 from drake_affetto.common.errors import InputError
-from drake_affetto.common.owner import MARK, claim_file, claim_folder
+from drake_affetto.common.owner import (
+    MARK,
+    check_file,
+    claim_file,
+    claim_folder,
+)
 
 
 def test_a_folder_belongs_to_who_made_it(tmp_path):
@@ -115,3 +122,31 @@ def test_a_command_refuses_anothers_folder_in_one_line(tmp_path, capsys):
         "start.dot",
         MARK,
     }
+
+
+def test_a_look_whether_a_file_may_be_written_leaves_no_trace(tmp_path):
+    folder = tmp_path / "drum"
+    assert check_file(folder / "table.csv", "export") == folder / "table.csv"
+    assert not folder.exists()
+    claim_folder(folder, "drum")
+    (folder / "replay.html").touch()
+    before = (folder / MARK).read_bytes()
+    check_file(folder / "table.csv", "export")
+    with pytest.raises(InputError, match="`affetto drum` made; name"):
+        check_file(folder / "replay.html", "export")
+    assert (folder / MARK).read_bytes() == before
+
+
+def test_what_killed_writers_left_goes_with_time(tmp_path):
+    claim_folder(tmp_path, "drum")
+    ago = time.time() - 86400.0
+    names = (".trial.3f14695c.png", ".trial.3f14695d.png", ".trial.png")
+    for name in (*names, "trial.3f14695c.png"):
+        (tmp_path / name).touch()
+        # The second may be written at this moment.
+        if name != names[1]:
+            os.utime(tmp_path / name, (ago, ago))
+    os.utime(tmp_path / MARK, (ago, ago))
+    claim_folder(tmp_path, "drum")
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left == {MARK, *names[1:], "trial.3f14695c.png"}

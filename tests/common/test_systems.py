@@ -12,7 +12,12 @@ from pydrake.systems.framework import (
 )
 import pytest
 
-from drake_affetto.common.systems import input_port, output_port, weakly
+from drake_affetto.common.systems import (
+    input_port,
+    make_room_for,
+    output_port,
+    weakly,
+)
 
 
 class Source(LeafSystem):
@@ -89,3 +94,25 @@ def test_a_system_that_gives_its_methods_weakly_works_and_goes():
     del dut
     gc.collect()
     assert left() is None
+
+
+class Circle:
+    """As a diagram and its systems: they know each other."""
+
+    def __init__(self):
+        make_room_for(self)
+        self.myself = self
+
+
+def test_diagrams_that_nobody_uses_go_before_another_is_built():
+    gc.collect()
+    gc.disable()
+    try:
+        built = [weakref.ref(Circle()) for _ in range(20)]
+        assert sum(each() is not None for each in built) <= 5
+        used = Circle()
+        for _ in range(10):
+            Circle()
+        assert used.myself is used
+    finally:
+        gc.enable()

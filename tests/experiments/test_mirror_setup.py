@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+import yaml
 
 from drake_affetto.calibration.plane import PlaneEstimate
 from drake_affetto.common.errors import InputError
@@ -120,3 +121,13 @@ def test_a_plane_is_judged():
         PlaneEstimate(true + [0.0, 0.0, 0.004], covariance, eye), pose
     )
     assert near.offset == pytest.approx(0.004)
+
+
+def test_an_edited_scenario_is_looked_at_again(tmp_path):
+    mine = tmp_path / "mine.yaml"
+    for x in (0.36, 0.34):
+        pose = {"translation": [x, 0.31, 0.18], "rotation": [101, 0, -14]}
+        frames = {"frames": {"mirror_pose": pose}}
+        mine.write_text(yaml.dump({"extends": "mirror", "world": frames}))
+        made = MirrorSetup.of(str(mine), "drumming")
+        assert made.nominal_pose().translation[0] == pytest.approx(x)

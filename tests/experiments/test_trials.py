@@ -1,5 +1,7 @@
 """Kinds of trial: one look and many strikes stand for whole trials."""
 
+import weakref
+
 import numpy as np
 import pytest
 
@@ -217,6 +219,26 @@ def test_a_scenario_that_changes_while_it_is_read_gives_no_trial(
     with pytest.raises(InputError, match="not the one of the trial"):
         trials.run_trial(spec)
     assert trials._RUNNERS == {}
+
+
+def test_a_study_of_many_bodies_keeps_few_runners(tmp_path, monkeypatch):
+    """Not one more while another is built: each has its renderers."""
+    alive: weakref.WeakSet = weakref.WeakSet()
+    counts = []
+
+    class Runner:
+        def __init__(self, scenario):
+            alive.add(self)
+            counts.append(len(alive))
+
+    monkeypatch.setattr(trials, "TrialRunner", Runner)
+    monkeypatch.setattr(trials, "_RUNNERS", {})
+    for number in range(8):
+        path = tmp_path / f"body_{number}.yaml"
+        path.write_text(f"extends: drumming\nsettling_duration: 1.{number}\n")
+        assert trials.runner(str(path)) is trials.runner(str(path))
+    assert len(counts) == 8
+    assert max(counts) == trials._MOST_RUNNERS
 
 
 def test_runners_can_be_handed_in():

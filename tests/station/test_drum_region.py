@@ -36,6 +36,7 @@ def test_a_box_is_the_polygon_of_its_corners(x, y, width, height):
         ({"polygon": [[0, 0], [1, 0]]}, r"s\.polygon is .*three corners"),
         ({"polygon": [[0, 0], [1, 0], [0]]}, r"s\.polygon\[2\]"),
         ({"polygon": [[0, 0], [1, 0], [float("nan"), 1]]}, r"s\.polygon\[2\]"),
+        ({"polygon": [[0, 0], [1, 0], [1e308, 1]]}, r"s\.polygon\[2\]\[0\]"),
         ({"polygon": [[0, 0], [1, 1], [1, 0], [0, 1]]}, "three corners"),
         ({"polygon": [[0, 0], [1e-3, 0], [0, 1e-3]]}, "at least 1 cm²"),
     ],

@@ -8,6 +8,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 import pytest
 
+from drake_affetto.common import systems
 from drake_affetto.common.errors import InputError
 from drake_affetto.pneumatics.chamber import Row
 from drake_affetto.pneumatics.parameters import chamber_volumes
@@ -306,6 +307,8 @@ def test_a_station_goes_with_its_last_reference(name):
     station = AffettoStation(scenario)
     context = station.CreateDefaultContext()
     port(station, context, "camera.blob_pixels")
+    # Before others are built they are looked for.
+    assert station in systems._DIAGRAMS
     parts = [station, *station.GetSystems()]
     left = {part.get_name(): weakref.ref(part) for part in parts}
     del station, context, parts

@@ -24,6 +24,7 @@ import tempfile
 import time
 import traceback
 from typing import Any
+import warnings
 
 import h5py
 import numpy as np
@@ -612,7 +613,11 @@ def try_input(reader: Reader, seed: int, folder: Path) -> Outcome:
     signal.signal(signal.SIGALRM, _too_long)
     signal.setitimer(signal.ITIMER_REAL, LONGEST)
     try:
-        reader.read(path)
+        # On the way to its one line, or to a number: the overflow of what was
+        # not checked.
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)
+            reader.read(path)
     except InputError as error:
         told = " ".join(str(error).split())
         end = "refused"
