@@ -196,24 +196,30 @@ def run_strikes(
             for xy, (_, arrays) in zip(places, found.values(), strict=True)
         ]
     limits = _drum_limits(runner_of(entry))
-    outcomes: list[tuple[str, Result]] = []
-    number = 0
-    for name, aim in AIMS.items():
-        specs: dict[int, Mapping[str, Any]] = {}
-        for _ in range(round(aim.share * strikes)):
-            of_low = thetas[aim.low]
-            xy, theta = of_low[int(rng.integers(len(of_low)))]
-            specs[number] = {
-                "kind": "strike",
-                "scenario": entry,
-                "xy": _beside(xy, aim, limits, rng).tolist(),
-                "theta": theta.tolist(),
-                "seed": trial_seed(seed, number),
-            }
-            number += 1
-        found = executor.run(f"Strikes: {name}", specs)
-        outcomes += [(name, result) for result in found.values()]
-    return outcomes
+    names = [
+        name
+        for name, aim in AIMS.items()
+        for _ in range(round(aim.share * strikes))
+    ]
+    # In no order, so that a part of the study is a smaller study.
+    rng.shuffle(names)
+    specs: dict[int, Mapping[str, Any]] = {}
+    for number, name in enumerate(names):
+        aim = AIMS[name]
+        xy, theta = thetas[aim.low][int(rng.integers(len(thetas[aim.low])))]
+        specs[number] = {
+            "kind": "strike",
+            "scenario": entry,
+            "aim": name,
+            "xy": _beside(xy, aim, limits, rng).tolist(),
+            "theta": theta.tolist(),
+            "seed": trial_seed(seed, number),
+        }
+    found = executor.run("Strikes", specs)
+    return [
+        (name, result)
+        for name, result in zip(names, found.values(), strict=True)
+    ]
 
 
 def _beside(
