@@ -292,3 +292,55 @@ def hear(
     rewards = np.array([reward(each, prototypes) for each in heard])
     rewards[lessons] = np.nan
     return rewards
+
+
+@dataclasses.dataclass
+class Count:
+    """What was heard of strikes of one aim.
+
+    A touch too light to be called a hit is neither a hit nor no touch.
+
+    Attributes:
+        aim: Name of the aim.
+        strikes: Number of strikes.
+        hits: Number of those with more than the impulse of a hit on the head.
+        missed: Number of hits whose R is not above the threshold.
+        least: Least R of a hit; None without hits.
+        untouched: Number of strikes that left the head alone.
+        false: Number of these whose R is above the threshold.
+        greatest: Greatest R of these; None without any.
+    """
+
+    aim: str
+    strikes: int
+    hits: int
+    missed: int
+    least: float | None
+    untouched: int
+    false: int
+    greatest: float | None
+
+
+def count(
+    aim: str, rewards: Array, impulse: Array, hit: float, threshold: float
+) -> Count:
+    """Counts what was heard.
+
+    Args:
+        aim: Name of the aim.
+        rewards: R of each strike (N,).
+        impulse: Impulse on the head of each (N,), N s.
+        hit: Impulse above which the head was hit, N s.
+        threshold: R above which a strike counts as a hit.
+    """
+    struck, alone = rewards[impulse > hit], rewards[impulse <= 0.0]
+    return Count(
+        aim=aim,
+        strikes=int(rewards.size),
+        hits=int(struck.size),
+        missed=int(np.sum(struck <= threshold)),
+        least=float(struck.min()) if struck.size else None,
+        untouched=int(alone.size),
+        false=int(np.sum(alone > threshold)),
+        greatest=float(alone.max()) if alone.size else None,
+    )
