@@ -90,6 +90,7 @@ def draw(
     left.axvline(threshold, color="k", linestyle="--", linewidth=1)
     left.axhline(1.0, color="0.6", linewidth=1)
     left.set_yscale("symlog", linthresh=1.0)
+    left.set_ylim(0.0, 1100.0)
     left.set_xlabel("threshold of R")
     left.set_ylabel("of 1,000")
     left.legend(fontsize=8)
