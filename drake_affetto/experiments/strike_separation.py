@@ -196,24 +196,30 @@ def run_strikes(
             for xy, (_, arrays) in zip(places, found.values(), strict=True)
         ]
     limits = _drum_limits(runner_of(entry))
-    outcomes: list[tuple[str, Result]] = []
-    number = 0
-    for name, aim in AIMS.items():
-        specs: dict[int, Mapping[str, Any]] = {}
-        for _ in range(round(aim.share * strikes)):
-            of_low = thetas[aim.low]
-            xy, theta = of_low[int(rng.integers(len(of_low)))]
-            specs[number] = {
-                "kind": "strike",
-                "scenario": entry,
-                "xy": _beside(xy, aim, limits, rng).tolist(),
-                "theta": theta.tolist(),
-                "seed": trial_seed(seed, number),
-            }
-            number += 1
-        found = executor.run(f"Strikes: {name}", specs)
-        outcomes += [(name, result) for result in found.values()]
-    return outcomes
+    names = [
+        name
+        for name, aim in AIMS.items()
+        for _ in range(round(aim.share * strikes))
+    ]
+    # In no order, so that a part of the study is a smaller study.
+    rng.shuffle(names)
+    specs: dict[int, Mapping[str, Any]] = {}
+    for number, name in enumerate(names):
+        aim = AIMS[name]
+        xy, theta = thetas[aim.low][int(rng.integers(len(thetas[aim.low])))]
+        specs[number] = {
+            "kind": "strike",
+            "scenario": entry,
+            "aim": name,
+            "xy": _beside(xy, aim, limits, rng).tolist(),
+            "theta": theta.tolist(),
+            "seed": trial_seed(seed, number),
+        }
+    found = executor.run("Strikes", specs)
+    return [
+        (name, result)
+        for name, result in zip(names, found.values(), strict=True)
+    ]
 
 
 def _beside(
@@ -286,3 +292,55 @@ def hear(
     rewards = np.array([reward(each, prototypes) for each in heard])
     rewards[lessons] = np.nan
     return rewards
+
+
+@dataclasses.dataclass
+class Count:
+    """What was heard of strikes of one aim.
+
+    A touch too light to be called a hit is neither a hit nor no touch.
+
+    Attributes:
+        aim: Name of the aim.
+        strikes: Number of strikes.
+        hits: Number of those with more than the impulse of a hit on the head.
+        missed: Number of hits whose R is not above the threshold.
+        least: Least R of a hit; None without hits.
+        untouched: Number of strikes that left the head alone.
+        false: Number of these whose R is above the threshold.
+        greatest: Greatest R of these; None without any.
+    """
+
+    aim: str
+    strikes: int
+    hits: int
+    missed: int
+    least: float | None
+    untouched: int
+    false: int
+    greatest: float | None
+
+
+def count(
+    aim: str, rewards: Array, impulse: Array, hit: float, threshold: float
+) -> Count:
+    """Counts what was heard.
+
+    Args:
+        aim: Name of the aim.
+        rewards: R of each strike (N,).
+        impulse: Impulse on the head of each (N,), N s.
+        hit: Impulse above which the head was hit, N s.
+        threshold: R above which a strike counts as a hit.
+    """
+    struck, alone = rewards[impulse > hit], rewards[impulse <= 0.0]
+    return Count(
+        aim=aim,
+        strikes=int(rewards.size),
+        hits=int(struck.size),
+        missed=int(np.sum(struck <= threshold)),
+        least=float(struck.min()) if struck.size else None,
+        untouched=int(alone.size),
+        false=int(np.sum(alone > threshold)),
+        greatest=float(alone.max()) if alone.size else None,
+    )

@@ -18,7 +18,11 @@ from scipy import stats
 
 from drake_affetto.common.errors import require
 from drake_affetto.common.typing import Array
-from drake_affetto.identification.fit import FitState, solve
+from drake_affetto.identification.fit import (
+    FIT_STAGES,
+    FitState,
+    fit_logs,
+)
 from drake_affetto.identification.problem import JointProblem
 from drake_affetto.identification.simulator import (
     JUDGED_FROM,
@@ -36,9 +40,8 @@ CONFIDENCE = 0.9
 _TIMING = 0.01
 # Least square of the floor, as a share of the mean squared error.
 _LEAST_FLOOR = 0.04
-_MEMBER_EVALUATIONS = 8
-_MEMBER_STEP = 5e-3
-_MEMBER_PRIOR = 0.03
+# Stages of a fit without a log: the last ones change little.
+_MEMBER_STAGES = 3
 
 LOOPS = ("closed", "open")
 
@@ -101,6 +104,9 @@ def fit_members(
 ) -> FitState:
     """Fits the parameters without each log in turn.
 
+    Each fit begins where the whole one began: one that began where that ended
+    would have seen the log, in what the others leave open.
+
     Args:
         problem: The joint.
         logs: Logs of the fit; with a single one there is nothing to do.
@@ -114,26 +120,21 @@ def fit_members(
     """
     if len(logs) < 2:
         return state
-    simulator = JointSimulator(problem)
     for left_out in logs:
         if left_out.name in state.members:
             continue
 
-        def report(cost: float, name: str = left_out.name) -> None:
+        def report(_: int, cost: float, name: str = left_out.name) -> None:
             if on_evaluation is not None:
                 on_evaluation(name, cost)
 
-        values, _ = solve(
-            simulator,
+        member = fit_logs(
+            problem,
             [log for log in logs if log is not left_out],
-            state.values,
-            state.start_delays,
-            prior=_MEMBER_PRIOR,
-            step=_MEMBER_STEP,
-            evaluations=_MEMBER_EVALUATIONS,
-            report=report,
+            stages=min(_MEMBER_STAGES, len(FIT_STAGES)),
+            on_evaluation=report,
         )
-        members = {**state.members, left_out.name: values}
+        members = {**state.members, left_out.name: member.values}
         state = dataclasses.replace(state, members=members)
         if on_member is not None:
             on_member(state)

@@ -70,6 +70,24 @@ def read_state(path: Path, key: str) -> FitState | None:
     return state if 0 <= state.stage <= len(FIT_STAGES) else None
 
 
+def _make_progress(console: Any) -> Any:
+    """A progress display with a note beside its bar."""
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+    )
+
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[note]}"),
+        TimeElapsedColumn(),
+        console=console,
+    )
+
+
 def _fit(
     problem: JointProblem,
     logs: Sequence[RobotLog],
@@ -78,13 +96,6 @@ def _fit(
     console: Any,
 ) -> FitState:
     """Fits with a progress display, from where a former run stopped."""
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-    )
-
     refits = len(logs) if len(logs) > 1 else 0
     total = len(FIT_STAGES) + len(PROFILED) + refits
     key = fit_key(problem, paths)
@@ -97,13 +108,7 @@ def _fit(
             highlight=False,
             soft_wrap=True,
         )
-    progress = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.fields[note]}"),
-        TimeElapsedColumn(),
-        console=console,
-    )
+    progress = _make_progress(console)
     task = progress.add_task("fitting", total=total, completed=done, note="")
     lowest = float("inf")
 

@@ -46,10 +46,10 @@ class RewardConfig:
 
     window: float = number(0.064, 1e-3, 1.0)
     hop: float = 0.016
-    bands: int = number(20, 1, 1000)
+    bands: int = number(30, 1, 1000)
     low: float = number(60.0, 1e-3, math.inf)
-    high: float = 800.0
-    floor: float = number(1e-3, 1e-12, math.inf)
+    high: float = 2600.0
+    floor: float = number(5e-4, 1e-12, math.inf)
     contrast: float = number(1.0, 0.0, 1.0)
     contrast_width: float = number(2.0, 0.0, math.inf)
     threshold: float = number(SUCCESS_THRESHOLD, 0.0, 1.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drake_affetto.common.errors import InputError
-from drake_affetto.identification import bands
+from drake_affetto.identification import bands, fit
 from drake_affetto.identification.bands import (
     CONFIDENCE,
     Band,
@@ -15,7 +15,7 @@ from drake_affetto.identification.bands import (
     fit_members,
     further_quantile,
 )
-from drake_affetto.identification.fit import FitState
+from drake_affetto.identification.fit import FitState, fit_logs
 from drake_affetto.identification.prediction import predict
 from drake_affetto.identification.simulator import JointSimulator, Simulated
 from support.robot_bench import make_log
@@ -82,7 +82,8 @@ def test_an_exact_model_gives_a_narrow_band(log):
 def test_bands_of_a_robot_that_differs_from_run_to_run(
     problem, truth, monkeypatch
 ):
-    monkeypatch.setattr(bands, "_MEMBER_EVALUATIONS", 2)
+    monkeypatch.setattr(bands, "_MEMBER_STAGES", 2)
+    monkeypatch.setattr(fit, "_EVALUATIONS", (2, 1))
     rng = np.random.default_rng(3)
 
     def run_of(seed):
@@ -99,24 +100,23 @@ def test_bands_of_a_robot_that_differs_from_run_to_run(
             p_b=one.p_b + 0.5 * rng.standard_normal(one.q.size),
         )
 
-    logs = [run_of(seed) for seed in range(6)]
-    delays = {each.name: 0.09 for each in logs}
-    begin = FitState(values=dict(truth), start_delays=delays)
+    logs = [run_of(seed) for seed in range(4)]
+    begin = fit_logs(problem, logs, stages=2)
     reached = []
     state = fit_members(problem, logs, begin, on_member=reached.append)
-    assert [len(each.members) for each in reached] == [1, 2, 3, 4, 5, 6]
+    assert [len(each.members) for each in reached] == [1, 2, 3, 4]
     # Where it was interrupted it goes on.
-    assert fit_members(problem, logs, reached[4]).members == state.members
+    assert fit_members(problem, logs, reached[2]).members == state.members
     simulator = JointSimulator(problem)
     scales = calibrate_bands(simulator, logs, state)
     unseen = [
-        predict(simulator, state, run_of(seed), scales) for seed in range(7, 13)
+        predict(simulator, state, run_of(seed), scales) for seed in range(7, 11)
     ]
     for loop in ("closed", "open"):
         shares = [each.bands[loop].coverage(each.log) for each in unseen]
         assert np.all(np.mean(shares, axis=0) > 0.9)
         half = unseen[0].bands[loop].half_width(unseen[0].log)
-        assert 0.2 < half[0] < 20.0
+        assert 0.2 < half[0] < 40.0
     # The open loop drifts, and its bands know it.
     closed, opened = (
         unseen[0].bands[loop].half_width(unseen[0].log)[0]
