@@ -15,7 +15,7 @@ plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=0.0)  # continuous
 (arm,) = Parser(plant).AddModels(str(models_dir() / "sdf/two_link_arm.sdf"))
 plant.Finalize()
 joints = {n: pneumatics.JointActuator(n) for n in ("shoulder", "elbow")}
-gains = dict.fromkeys(joints, control.JointGains(1e6, 1e6, 4e4, 5e-6))
+gains = dict.fromkeys(joints, control.JointGains(1e6, 1e6, 4e4, 4e-6))
 config = control.PidfConfig(control.ControlParameters(gains=gains))
 driver = pneumatics.PneumaticDriver(joints, control=config)
 pneumatics.ApplyPneumaticDriver(driver, plant, arm, builder)
@@ -28,7 +28,7 @@ for i, (diagram, factors) in enumerate(runs):
     diagram.get_input_port(0).FixValue(context, [0.3, 0.5, 0.0, 0.0])
     pidf = diagram.GetSubsystemByName("two_link_arm.controller")
     own = pidf.GetMyMutableContextFromRoot(context)
-    pidf.set_gains(own, np.repeat([1e6, 1e6, 4e4, 5e-6], 2) * factors)
+    pidf.set_gains(own, np.repeat([1e6, 1e6, 4e4, 4e-6], 2) * factors)
     simulator = Simulator_[AutoDiffXd if i == 0 else float](diagram, context)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.002)
     simulator.get_mutable_integrator().set_fixed_step_mode(True)
