@@ -19,6 +19,8 @@ from pydrake.systems.framework import (
 from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
 from drake_affetto.common.typing import Array
+from drake_affetto.experiments.fault_injection import FaultInjection
+from drake_affetto.faults.supervisor import Verdict
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.perception import gaze as gaze_state
 from drake_affetto.perception.gaze import GazePhase
@@ -130,12 +132,13 @@ class _Look:
     """The last search of a runner, and the station at its end.
 
     Attributes:
-        key: Position of the drum, seed of the trial and pose of the mirror.
+        key: Position of the drum, seed of the trial, pose of the mirror and
+            faults.
         outcome: Outcome of the search.
         end: Context at its end.
     """
 
-    key: tuple[float, float, int, world.FramePose | None]
+    key: tuple[float, float, int, world.FramePose | None, str]
     outcome: GazeOutcome
     end: Context
 
@@ -210,6 +213,9 @@ class TrialRunner:
         self._mirror: world.FramePose | None = None
         self._looked: _Look | None = None
         self._taps: list[Array] | None = None
+        self.injection: FaultInjection | None = None
+        if self.station.faults is not None:
+            self.injection = FaultInjection(self)
 
     def place_mirror(self, pose: world.FramePose | None) -> None:
         """Puts the mirror there in the trials to come; None: as the scenario.
@@ -391,7 +397,8 @@ class TrialRunner:
             xy: Position of the drum (2,), m.
             seed: Seed of the trial.
         """
-        key = (float(xy[0]), float(xy[1]), seed, self._mirror)
+        faults = "" if self.injection is None else self.injection.key
+        key = (float(xy[0]), float(xy[1]), seed, self._mirror, faults)
         if self._looked is None or self._looked.key != key:
             outcome = self.gaze(xy, seed)
             if self._looked is None:
@@ -462,6 +469,8 @@ class TrialRunner:
         if self._mirror is not None:
             self.station.set_mirror_pose(self._station_context, self._mirror)
         self.station.set_seed(self._station_context, seed)
+        if self.injection is not None:
+            self.injection.begin(xy, seed)
         self._clear_logs()
         self.simulator.Initialize()
         return self.context.get_time()
@@ -489,6 +498,8 @@ class TrialRunner:
         settled = gaze.get_settled_output_port()
         failed = gaze.GetOutputPort("failed")
         while not settled.Eval(context)[0] and not failed.Eval(context)[0]:
+            if not self.verdict.valid:
+                break
             self._advance_frame(begin, on_frame)
         return GazeOutcome(
             found=bool(settled.Eval(context)[0]),
@@ -537,6 +548,8 @@ class TrialRunner:
             np.abs(flow),
             np.random.default_rng([seed, 0x50BD]),
         )
+        if self.injection is not None:
+            sound = self.injection.hear(sound, start, start + float(t[0]))
         return Recording(
             t=t,
             contact_force=contact,
@@ -553,8 +566,17 @@ class TrialRunner:
 
     def advance(self, time: float) -> None:
         """Simulates until `time`, s."""
-        if time > self.context.get_time():
+        if time <= self.context.get_time():
+            return
+        if self.injection is not None:
+            self.injection.advance(time)
+        else:
             self.simulator.AdvanceTo(time)
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the supervisor says of the trial so far; valid without one."""
+        return Verdict() if self.injection is None else self.injection.verdict
 
     def _log(self, name: str) -> tuple[Array, Array]:
         """Times (T,) and values (T, size) of a log, each time once."""
