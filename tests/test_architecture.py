@@ -29,6 +29,7 @@ ORDER = [
     {"pneumatics"},
     {"sensing"},
     {"sound"},
+    {"faults"},
     {"teaching"},
     {"station", "scenario"},
     {"robot"},
@@ -41,7 +42,7 @@ ORDER = [
     {"cli"},
 ]
 RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
-STAGES = [name for names in ORDER[1:12] for name in names]
+STAGES = [name for names in ORDER[1:13] for name in names]
 
 # The mathematics, which must also serve who has no Drake. The test adds to
 # them every module of a stage that does not import Drake in its own text.

@@ -316,7 +316,7 @@ class TrialRunner:
         begin = self.settle(xy, seed)
         # What holds the arm at rest will hold it while it is guided.
         self.advance(begin + teaching.settling_time)
-        u_eq = self._log("affetto.pid_output")[1].mean(axis=0)
+        u_eq = self.log("affetto.pid_output")[1].mean(axis=0)
         controller = self._sub(station.controller)
         gains = station.controller.get_gains(controller)
         station.controller.set_gains(
@@ -329,8 +329,8 @@ class TrialRunner:
         """Records the guided movement from the time `grasped` on, s."""
         self._clear_logs()
         self.advance(grasped + self.scenario.teaching.duration)
-        t, state = self._log("affetto.estimated_state")
-        _, pull = self._log("teacher.pulling_force")
+        t, state = self.log("affetto.estimated_state")
+        _, pull = self.log("teacher.pulling_force")
         t = t - grasped
         q = state[:, : self.station.num_joints]
         return GuidedMovement(
@@ -349,8 +349,9 @@ class TrialRunner:
             seed: Seed of the microphone's noise and the robot's variation.
         """
         start = self.settle(xy, seed) + self.scenario.policy.delay
+        self._watch()
         self.play(theta, start)
-        return self._record(start, seed)
+        return self.record(start, seed)
 
     def play(self, theta: Array, start: float) -> None:
         """Has the movement θ (n·K,) begin at the time `start`, s."""
@@ -384,7 +385,7 @@ class TrialRunner:
                 raise RuntimeError("the gaze has settled but is never ready")
             self.advance(self.context.get_time() + FRAME_PERIOD)
         start = float(self.port("affetto.start_time")[0])
-        return outcome, self._record(start, seed)
+        return outcome, self.record(start, seed)
 
     def look(self, xy: Array, seed: int) -> GazeOutcome:
         """The search for the drum, at whose end the station then is.
@@ -411,6 +412,12 @@ class TrialRunner:
         self._clear_logs()
         self.simulator.Initialize()
         return self._looked.outcome
+
+    def look_again(self) -> GazeOutcome:
+        """Searches for the drum once more, where a movement has ended."""
+        self.station.gaze.reset(self._sub(self.station.gaze))
+        self.simulator.Initialize()
+        return self._wait_for_gaze(self.context.get_time())
 
     def palm_path(self, state: Array) -> Array:
         """Positions (T, 3) of the palm, m in the world.
@@ -488,7 +495,13 @@ class TrialRunner:
                     target
                 ).SetStateAndParametersFrom(system.GetMyContextFromRoot(source))
 
+    def _watch(self) -> None:
+        """Has the supervisor watch what follows, if there is one."""
+        if self.injection is not None:
+            self.injection.watch(True)
+
     def _enable_gaze(self) -> None:
+        self._watch()
         self.station.gaze.set_enabled(self._sub(self.station.gaze), True)
 
     def _wait_for_gaze(
@@ -516,7 +529,7 @@ class TrialRunner:
         if on_frame is not None:
             on_frame(self.context.get_time() - begin)
 
-    def _record(self, start: float, seed: int) -> Recording:
+    def record(self, start: float, seed: int) -> Recording:
         """Simulates the movement that starts at `start`, with its sound."""
         self.advance(start)
         self._clear_logs()
@@ -533,10 +546,10 @@ class TrialRunner:
             seed: Seed of the microphone's noise.
         """
         self.advance(self.context.get_time() + _RINGING)
-        t, contact = self._log("drum.contact_force")
-        _, knock = self._log("drum.knock_force")
-        _, flow = self._log("affetto.mass_flow")
-        joint_t, state = self._log("affetto.estimated_state")
+        t, contact = self.log("drum.contact_force")
+        _, knock = self.log("drum.knock_force")
+        _, flow = self.log("affetto.mass_flow")
+        joint_t, state = self.log("affetto.estimated_state")
         # A contact's force is that over the plant's step from then on.
         t = t - start + 0.5 * self.scenario.plant_config.time_step
         sound = self.voice.synthesize(
@@ -556,10 +569,10 @@ class TrialRunner:
             knock_force=knock,
             joint_t=joint_t - start,
             joint_state=state,
-            true_state=self._log("affetto.joint_state")[1],
-            desired_state=self._log("affetto.desired_state")[1],
-            chamber_pressure=self._log("affetto.chamber_pressure")[1],
-            valve_opening=self._log("affetto.valve_opening")[1],
+            true_state=self.log("affetto.joint_state")[1],
+            desired_state=self.log("affetto.desired_state")[1],
+            chamber_pressure=self.log("affetto.chamber_pressure")[1],
+            valve_opening=self.log("affetto.valve_opening")[1],
             sound=sound,
             sound_rate=self.voice.rate,
         )
@@ -578,7 +591,7 @@ class TrialRunner:
         """What the supervisor says of the trial so far; valid without one."""
         return Verdict() if self.injection is None else self.injection.verdict
 
-    def _log(self, name: str) -> tuple[Array, Array]:
+    def log(self, name: str) -> tuple[Array, Array]:
         """Times (T,) and values (T, size) of a log, each time once."""
         log = self._logs[name].FindLog(self.context)
         t = log.sample_times()

@@ -12,6 +12,7 @@ from drake_affetto.faults.hearing import sound_scores
 from drake_affetto.faults.sounds import with_faults
 from drake_affetto.faults.supervision import REASONS, Check
 from drake_affetto.faults.supervisor import Verdict
+from drake_affetto.perception.camera_model import CameraModel
 from drake_affetto.perception.plant_camera_model import make_camera_model
 from drake_affetto.scene import world
 
@@ -44,6 +45,7 @@ class FaultInjection:
         # What was found afterwards: the greatest score of each check.
         self._late: dict[Check, float] = {}
         self._late_time = math.inf
+        self._sight: CameraModel | None = None
 
     @property
     def key(self) -> str:
@@ -122,12 +124,17 @@ class FaultInjection:
         runner, parameters = self._runner, self._wiring.supervisor.parameters
         head, radius = self._known_drum()
         palm = runner.palm_path(recording.joint_state)
-        low = palm[:, 2] - radius < head + parameters.low
+        height = palm[:, 2] - radius - head
+        low = height < parameters.low
         place = self._seen_place(tau)
-        distance: float | None = None
+        distances: tuple[float, float] | None = None
         if place is not None:
-            away = np.linalg.norm(palm[low, :2] - place, axis=1)
-            distance = float(away.min(initial=math.inf))
+            away = np.linalg.norm(palm[:, :2] - place, axis=1)
+            deep = height < -parameters.deep
+            distances = (
+                float(away[low].min(initial=math.inf)),
+                float(away[deep].min(initial=math.inf)),
+            )
         self._say(
             sound_scores(
                 parameters,
@@ -135,7 +142,7 @@ class FaultInjection:
                 recording.sound_rate,
                 low,
                 float(recording.joint_t[1] - recording.joint_t[0]),
-                distance,
+                distances,
                 heard,
             )
         )
@@ -170,17 +177,19 @@ class FaultInjection:
         None where it was seen from a fixed yaw: in a mirror whose plane may
         not be known.
         """
-        scenario, station = self._runner.scenario, self._runner.station
+        scenario = self._runner.scenario
         if scenario.look.mode != "centre":
             return None
-        plant = station.plant
-        root = station.CreateDefaultContext()
-        sight = make_camera_model(
-            plant,
-            plant.GetMyContextFromRoot(root),
-            scenario.camera,
-            scenario.yaw_joint,
-        )
+        if self._sight is None:
+            plant = self._runner.station.plant
+            root = self._runner.diagram.CreateDefaultContext()
+            self._sight = make_camera_model(
+                plant,
+                plant.GetMyContextFromRoot(root),
+                scenario.camera,
+                scenario.yaw_joint,
+            )
         v = scenario.blob.calibration.pixels(np.array([0.0, tau[0]]))[1]
-        u = sight.camera.image_center[0]
-        return np.asarray(sight.locate(np.array([u, v]), float(tau[1])))[:2]
+        u = self._sight.camera.image_center[0]
+        seen = self._sight.locate(np.array([u, v]), float(tau[1]))
+        return np.asarray(seen)[:2]

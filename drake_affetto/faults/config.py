@@ -157,12 +157,7 @@ class Fault:
             where: Name of the fault in errors.
             joints: Names of the active joints.
         """
-        require(
-            self.kind in KINDS,
-            f"{where}.kind",
-            self.kind,
-            f"one of {', '.join(KINDS)}",
-        )
+        self.check_kind(where)
         kind = KINDS[self.kind]
         require_range(f"{where}.onset", self.onset, 0.0, TO_THE_END)
         require_range(f"{where}.length", self.length, 1e-3, TO_THE_END)
@@ -196,6 +191,15 @@ class Fault:
             else f"none, for {self.kind} has no channels",
         )
         require_choice(f"{where}.since", self.since, TRIAL, MOVEMENT)
+
+    def check_kind(self, where: str) -> None:
+        """Raises InputError unless there is such a kind of fault."""
+        require(
+            self.kind in KINDS,
+            f"{where}.kind",
+            self.kind,
+            f"one of {', '.join(KINDS)}",
+        )
 
     @property
     def place(self) -> str:

@@ -28,7 +28,7 @@ def sound_scores(
     rate: float,
     low: Mask,
     step: float,
-    distance: float | None,
+    distances: tuple[float, float] | None,
     heard: bool,
 ) -> dict[Check, float]:
     """Scores of a recording and the stroke that it is of.
@@ -40,9 +40,9 @@ def sound_scores(
         low: Whether the palm was so low that it may touch (T,), by the angles
             as read.
         step: Time between two of them, s.
-        distance: Least distance of the low palm from where the drum was seen,
-            level with the table, m; infinite if it was never low; None if the
-            place is not known.
+        distances: Least distances of the low palm and of the deep one from
+            where the drum was seen, level with the table, m; infinite if it was
+            never so low; None if the place is not known.
         heard: Whether the reward calls it a success.
     """
     quiet = sound[: max(1, int(_QUIET * rate))]
@@ -69,13 +69,13 @@ def sound_scores(
         Check.SOUND_NOISY: before / max(parameters.sound_loud, 1e-9),
         Check.SOUND_ELSEWHERE: float(drum[away].max(initial=0.0)) / loudest,
     }
-    if distance is None:
+    if distances is None:
         return scores
     if heard:
-        beyond = distance / max(parameters.far, 1e-9)
+        beyond = distances[0] / max(parameters.far, 1e-9)
         scores[Check.SOUND_UNREACHED] = min(beyond, _FAR_BEYOND)
     else:
-        near = parameters.near / max(distance, 1e-3)
+        near = parameters.near / max(distances[1], 1e-3)
         scores[Check.SOUND_MISSING] = min(near, _FAR_BEYOND)
     return scores
 

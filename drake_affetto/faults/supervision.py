@@ -17,6 +17,7 @@ are read, the commands, their time stamps, and what the image is like.
 
 import dataclasses
 import enum
+import math
 
 import numba
 import numpy as np
@@ -113,6 +114,8 @@ class SupervisorParameters:
         pressure_jump: Greatest error of a prediction in one sample, Pa.
         pressure_model: Greatest error of the predictions, Pa ...
         pressure_time: ... with this time constant, s.
+        pressure_lag: Uncertainty of valves' lag and dead time, s: both may be
+            off by what a chamber's pressure changed in that time, lately.
         observer_time: Time constant with which predictions follow readings, s.
         tracking: Greatest error of an angle, rad ...
         tracking_time: ... with this time constant, s.
@@ -138,10 +141,11 @@ class SupervisorParameters:
             (rms), Pa.
         sound_elsewhere: Greatest sound pressure below 1 kHz (rms over 30 ms)
             while the hand is away from the drum, as a share of the loudest.
-        near: Distance between hand and seen drum within which a stroke is
-            heard, m.
-        far: Distance beyond which none is, m.
-        low: Height of the palm above the head's below which it may touch, m.
+        near: Distance between hand and seen drum within which a hand as deep as
+            `deep` below the head is heard, m.
+        deep: That depth of the hand's lowest point, m.
+        far: Distance beyond which no stroke is heard, m.
+        low: Height of that point above the head from which on it may touch, m.
         ringing: How long a drum rings on, s.
     """
 
@@ -155,6 +159,7 @@ class SupervisorParameters:
     pressure_jump: float = number(40e3, 1.0, 1e6)
     pressure_model: float = number(40e3, 1.0, 1e6)
     pressure_time: float = number(0.05, 0.001, 10.0)
+    pressure_lag: float = number(0.01, 0.0, 1.0)
     observer_time: float = number(0.2, 0.01, 10.0)
     tracking: float = number(0.3, 0.001, 3.0)
     tracking_time: float = number(0.2, 0.01, 10.0)
@@ -176,7 +181,8 @@ class SupervisorParameters:
     sound_loud: float = number(0.01, 0.0, 10.0)
     sound_elsewhere: float = number(0.2, 0.0, 1.0)
     near: float = number(0.025, 0.0, 1.0)
-    far: float = number(0.08, 0.0, 1.0)
+    deep: float = number(0.003, -1.0, 1.0)
+    far: float = number(0.06, 0.0, 1.0)
     low: float = number(0.0, -1.0, 1.0)
     ringing: float = number(0.5, 0.0, 10.0)
 
@@ -204,6 +210,7 @@ class SupervisorParameters:
                 self.tick_age,
                 self.tick_missed,
                 self.tick_time,
+                self.pressure_lag,
             ],
             dtype=float,
         )
@@ -234,8 +241,8 @@ def second_difference_deviation(
 def watch_size(n: int) -> int:
     """Size of the memory of `watch_signals`: [filled, missed, stamp, angles
     (2n), pressures (2n), samples alike (3n), variance (n), error (n),
-    prediction's error (2n)]."""
-    return 3 + 11 * n
+    prediction's error (2n), its change lately (2n)]."""
+    return 3 + 13 * n
 
 
 @numba.njit(cache=True)
@@ -286,6 +293,7 @@ def watch_signals(
     variance = memory[3 + 7 * n : 3 + 8 * n]
     error = memory[3 + 8 * n : 3 + 9 * n]
     surprise = memory[3 + 9 * n : 3 + 11 * n]
+    swing = memory[3 + 11 * n : 3 + 13 * n]
     first = memory[0] == 0.0
     if first:
         memory[0] = 1.0
@@ -300,6 +308,7 @@ def watch_signals(
             p1[c] = pressure[c]
             predicted[c] = pressure[c]
             surprise[c] = 0.0
+            swing[c] = 0.0
         alike[:] = 0.0
         actuators[:] = 0.0
     for k in range(10):
@@ -327,6 +336,7 @@ def watch_signals(
             scores[7] = abs(error[i]) / limits[11]
             channels[7] = i
 
+    before = predicted.copy()
     step_joints(
         period,
         FLOW_MODE,
@@ -346,11 +356,14 @@ def watch_signals(
         p1[c] = pressure[c]
         off = pressure[c] - predicted[c]
         surprise[c] += period / limits[9] * (off - surprise[c])
+        swing[c] *= math.exp(-period / limits[10])
+        change = abs(predicted[c] - before[c]) * limits[16] / period
+        swing[c] = max(swing[c], change)
         found = (
             alike[n + c] / limits[1],
             abs(pressure[c] - middle) / half,
-            abs(off) / limits[7],
-            abs(surprise[c]) / limits[8],
+            abs(off) / (limits[7] + swing[c]),
+            abs(surprise[c]) / (limits[8] + swing[c]),
         )
         for k in range(4):
             if found[k] > scores[3 + k]:

@@ -79,7 +79,8 @@ class Supervisor(LeafSystem):
       joint or chamber that it is of; when, s.
     - valve_action (1): for `PneumaticActuation`: nothing, until a check is not
       passed.
-    - scores (checks): greatest score of each check so far; 1: not passed.
+    - scores (checks): greatest score of each check until one is not
+      passed, which is at 1.
 
     Signals are watched at every tick of the controller, images at the camera's
     rate while the gaze looks. `watch` switches both, and forgets what was
@@ -257,11 +258,11 @@ class Supervisor(LeafSystem):
         channels: Array,
     ) -> None:
         """Keeps the greatest scores; the first that is not passed decides."""
-        greatest = values.get_mutable_value(self._scores_index)
-        np.maximum(greatest, scores, out=greatest)
         verdict = values.get_mutable_value(self._verdict_index)
         if verdict[0] != 0.0:
             return
+        greatest = values.get_mutable_value(self._scores_index)
+        np.maximum(greatest, scores, out=greatest)
         (beyond,) = np.nonzero(scores >= 1.0)
         if beyond.size:
             check = Check(int(beyond[0]))
