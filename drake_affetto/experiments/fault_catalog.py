@@ -37,7 +37,7 @@ class FaultSweep:
         self, size: float, joints: list[str], rng: np.random.Generator
     ) -> Fault:
         """A fault of that size: onset, joint and chamber are drawn."""
-        onset = float(rng.uniform(*self.span))
+        onset = float(rng.uniform(self.span[0], self.span[1]))
         joint = joints[int(rng.integers(len(joints)))]
         channel = str(rng.choice(["a", "b"]))
         place = KINDS[self.kind].place
@@ -66,12 +66,8 @@ class FaultCatalog:
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that does not fit."""
-        require(
-            len(self.joints) > 0, f"{where}.joints", self.joints, "joints"
-        )
-        require(
-            len(self.faults) > 0, f"{where}.faults", self.faults, "faults"
-        )
+        require(len(self.joints) > 0, f"{where}.joints", self.joints, "joints")
+        require(len(self.faults) > 0, f"{where}.faults", self.faults, "faults")
         rng = np.random.default_rng(0)
         for i, sweep in enumerate(self.faults):
             field = f"{where}.faults[{i}]"

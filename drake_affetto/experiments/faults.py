@@ -35,6 +35,7 @@ from drake_affetto.experiments.trials import (
 from drake_affetto.faults.config import KINDS
 from drake_affetto.faults.supervision import Check
 from drake_affetto.runner.executor import Spec, TrialExecutor
+from drake_affetto.skill.policy import Regressor
 from drake_affetto.sound.config import load_sound_config
 from drake_affetto.station.scenario import load_scenario
 
@@ -84,9 +85,7 @@ def run_faults(executor: TrialExecutor, plan: FaultsPlan) -> FaultsResults:
     skill = learn_skill(
         scenario.skill, demonstrations, trial_seed(plan.seed, _HIDDEN)
     )
-    tests = _plan_tests(
-        plan, catalog, skill, stack_prototypes(demonstrations)
-    )
+    tests = _plan_tests(plan, catalog, skill, stack_prototypes(demonstrations))
     outcomes = run_trials(executor, "Drumming with faults", tests)
     hit = load_sound_config(scenario.sound).hit_impulse
     return make_results(plan, catalog, outcomes, hit)
@@ -95,7 +94,7 @@ def run_faults(executor: TrialExecutor, plan: FaultsPlan) -> FaultsResults:
 def _plan_tests(
     plan: FaultsPlan,
     catalog: FaultCatalog,
-    skill: object,
+    skill: Regressor,
     prototypes: np.ndarray,
 ) -> dict[_Test, Spec]:
     """All trials, the first of each fault first."""
@@ -211,9 +210,7 @@ def _row(
     )
 
 
-def _sound(
-    results: Sequence[WatchedResult], hit_impulse: float
-) -> SoundTrials:
+def _sound(results: Sequence[WatchedResult], hit_impulse: float) -> SoundTrials:
     valid = [r for r in results if not r.invalid]
     scores = np.max([r.scores for r in results], axis=0)
     return SoundTrials(

@@ -67,14 +67,16 @@ def _run(
     gaze = trials.gaze(xy, seed)
     begin = trials.context.get_time() - gaze.duration
     if not gaze.found and trials.verdict.valid:
-        injection.lost()
+        # A gaze that does not come to rest is the robot's own failure.
+        if not trials.port("camera.blob")[2]:
+            injection.lost()
     recording = None
     value = 0.0
     start = math.inf
     force, speed = 0.0, 0.0
-    if trials.verdict.valid:
+    if gaze.found and trials.verdict.valid:
         start = _await_movement(trials, spec["regressor"])
-    if trials.verdict.valid:
+    if gaze.found and trials.verdict.valid:
         # What was before the movement is forgotten as it begins.
         trials.advance(start)
         force, speed = _greatest(trials)

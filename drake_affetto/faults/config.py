@@ -93,7 +93,11 @@ KINDS: dict[str, Kind] = {
         "camera", 0.0, 100.0, "px", "the image is smeared over so many pixels"
     ),
     "marker_hidden": Kind(
-        "camera", 0.0, 1.0, "share", "that share of the marker's width is hidden"
+        "camera",
+        0.0,
+        1.0,
+        "share",
+        "that share of the marker's width is hidden",
     ),
     "second_marker": Kind(
         "camera",

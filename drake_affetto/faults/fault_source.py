@@ -1,4 +1,4 @@
-"""The system that knows the faults of a trial and hands them to their places."""
+"""The system that knows a trial's faults and hands them to their places."""
 
 from typing import Any
 

@@ -96,7 +96,9 @@ def image_statistics(image: Image, config: BlobConfig) -> Array:
         image: (height, width, 3 or 4), uint8.
         config: How the marker looks.
     """
-    gray = cv2.cvtColor(np.ascontiguousarray(image[..., :3]), cv2.COLOR_RGB2GRAY)
+    gray = cv2.cvtColor(
+        np.ascontiguousarray(image[..., :3]), cv2.COLOR_RGB2GRAY
+    )
     mean, deviation = cv2.meanStdDev(gray)
     full = cv2.inRange(image[..., :3].max(axis=2), 255, 255)
     # Of half the size each pixel's noise is half as well; edges stay.

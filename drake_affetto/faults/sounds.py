@@ -9,7 +9,7 @@ from drake_affetto.faults.schedule import FaultSchedule
 from drake_affetto.sound import impact
 from drake_affetto.sound.voice import DrumVoice
 
-# A hum of the mains: its frequency, Hz, and the strength of its overtones [est].
+# A hum of the mains: frequency, Hz, and strength of its overtones [est].
 _MAINS = 50.0
 _OVERTONES = (1.0, 0.5, 0.7, 0.3, 0.4, 0.2)
 

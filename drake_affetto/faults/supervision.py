@@ -133,6 +133,8 @@ class SupervisorParameters:
         second: ... and the greatest: beyond it there is another one.
         margin: Distance from the image's edge from which on a marker is looked
             at for that, px.
+        middle: Distance from the image's middle up to which one is that the
+            gaze centers, px: farther off, the robot's own arm may hide it.
         moved: Greatest distance between the drum's task parameters before and
             after the movement.
         sound_dead: Least sound pressure (rms) before the stroke, Pa.
@@ -175,6 +177,7 @@ class SupervisorParameters:
     whole: float = number(0.85, 0.0, 1.0)
     second: float = number(1.3, 1.0, 100.0)
     margin: float = number(25.0, 0.0, 1000.0)
+    middle: float = number(53.0, 0.0, 1e4)
     moved: float = number(0.05, 0.0, 10.0)
     sound_dead: float = number(3e-4, 0.0, 1.0)
     sound_clipped: int = number(8, 1, 1_000_000)
@@ -359,15 +362,15 @@ def watch_signals(
         swing[c] *= math.exp(-period / limits[10])
         change = abs(predicted[c] - before[c]) * limits[16] / period
         swing[c] = max(swing[c], change)
-        found = (
+        of_chamber = (
             alike[n + c] / limits[1],
             abs(pressure[c] - middle) / half,
             abs(off) / (limits[7] + swing[c]),
             abs(surprise[c]) / (limits[8] + swing[c]),
         )
         for k in range(4):
-            if found[k] > scores[3 + k]:
-                scores[3 + k] = found[k]
+            if of_chamber[k] > scores[3 + k]:
+                scores[3 + k] = of_chamber[k]
                 channels[3 + k] = c
         # The air that is taken to be there changes with its pressure.
         nearer = predicted[c] + period / limits[10] * off
@@ -425,8 +428,8 @@ def marker_scores(
     parameters: SupervisorParameters,
     pixels: Array,
     hue_area: float,
-    width: int,
-    height: int,
+    size: tuple[int, int],
+    centered: bool,
 ) -> dict[Check, float]:
     """Scores of how the marker is seen; none where it is not well in view.
 
@@ -434,11 +437,14 @@ def marker_scores(
         parameters: Thresholds.
         pixels: u, v, area and confidence, see `BlobSensor`.
         hue_area: Area of the marker's hue in the image, px².
-        width: Width of the image, px.
-        height: Height of the image, px.
+        size: Width and height of the image, px.
+        centered: Whether the gaze centers the marker before τ is taken.
     """
     u, v, area, confidence = pixels
     margin = parameters.margin
+    width, height = size
+    if centered and abs(u - 0.5 * width) > parameters.middle:
+        return {}
     if area <= 0.0 or not (
         margin < u < width - margin and margin < v < height - margin
     ):

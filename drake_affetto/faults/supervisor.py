@@ -98,6 +98,7 @@ class Supervisor(LeafSystem):
         image_size: tuple[int, int],
         *,
         action: int,
+        centered: bool = True,
         period: float = 0.005,
         rate: float = 10.0,
     ):
@@ -111,6 +112,7 @@ class Supervisor(LeafSystem):
             joints: Names of the n joints.
             image_size: Width and height of the image, px.
             action: What the valves are told where a check is not passed.
+            centered: Whether the gaze centers the marker.
             period: Time between two ticks, s.
             rate: Images per second.
 
@@ -126,6 +128,7 @@ class Supervisor(LeafSystem):
         self.joints = joints
         self._size = image_size
         self._action = float(action)
+        self._centered = centered
         self._period = float(period)
         n = len(joints)
         for name, size in (
@@ -243,7 +246,11 @@ class Supervisor(LeafSystem):
         image[0] = statistics[DIGEST]
         found = image_scores(self.parameters, statistics, int(image[1]))
         found |= marker_scores(
-            self.parameters, pixels, statistics[HUE_AREA], *self._size
+            self.parameters,
+            pixels,
+            statistics[HUE_AREA],
+            self._size,
+            self._centered,
         )
         scores = np.zeros(CHECKS)
         for check, score in found.items():
@@ -268,5 +275,3 @@ class Supervisor(LeafSystem):
             check = Check(int(beyond[0]))
             verdict[:] = check + 1, channels[check], context.get_time()
             values.get_mutable_value(self._action_index)[:] = self._action
-
-

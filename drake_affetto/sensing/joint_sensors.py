@@ -1,6 +1,7 @@
 """The sensors of all joints as a system."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -203,7 +204,7 @@ class JointSensors(LeafSystem):
         # Views of the inputs: a port's `Eval` would copy.
         read = self.EvalVectorInput
         mutable = discrete_state.get_mutable_value
-        wrong = ()
+        wrong: tuple[Any, ...] = ()
         if self._raw_index is not None:
             wrong = (
                 read(context, self._FAULTS).value(),

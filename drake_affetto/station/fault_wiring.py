@@ -32,12 +32,12 @@ from drake_affetto.faults.supervision import second_difference_deviation
 from drake_affetto.faults.supervisor import Supervisor, Verdict
 from drake_affetto.perception.gaze_servo import GazeServo
 from drake_affetto.perception.mirror_camera import MirrorCamera
+from drake_affetto.pneumatics.chamber import Row
 from drake_affetto.pneumatics.driver import PneumaticSystems
 from drake_affetto.pneumatics.parameters import (
     load_parameters,
     parameter_array,
 )
-from drake_affetto.pneumatics.chamber import Row
 from drake_affetto.scene import world
 from drake_affetto.scene.joints import select_joints
 from drake_affetto.sensing.joint_sensors import JointSensors
@@ -64,6 +64,7 @@ class FaultScenario(Protocol):
     active_joints: list[str]
     variation: Any
     camera: Any
+    look: Any
     blob: Any
     drum_region: Any
     control: Any
@@ -236,6 +237,7 @@ class FaultWiring:
             policy.get_start_time_output_port(),
             self.source.get_start_time_input_port(),
         )
+        assert self.camera_faults is not None
         action = self._systems.actuation.get_valve_action_input_port()
         if not scenario.supervisor.enabled:
             calm = builder.AddNamedSystem(
@@ -257,6 +259,7 @@ class FaultWiring:
                 tuple(names),
                 (scenario.camera.width, scenario.camera.height),
                 action=scenario.supervisor.action,
+                centered=scenario.look.mode == "centre",
                 period=period,
                 rate=scenario.camera.rate,
             ),
@@ -276,9 +279,7 @@ class FaultWiring:
         }
         for name, port in watched.items():
             builder.Connect(port, self.supervisor.GetInputPort(name))
-        builder.Connect(
-            self.supervisor.get_valve_action_output_port(), action
-        )
+        builder.Connect(self.supervisor.get_valve_action_output_port(), action)
 
     # In a trial
 
@@ -409,9 +410,7 @@ class FaultWiring:
             places = place + fault.size * ways
             good = np.all((places >= low) & (places <= high), axis=1)
             place = places[int(np.argmax(good))]
-        world.set_drum_position(
-            self._plant, context, np.clip(place, low, high)
-        )
+        world.set_drum_position(self._plant, context, np.clip(place, low, high))
 
     def _lose_hand(self, root: Context, lost: bool) -> None:
         """Lets the hand touch nothing, or all again."""

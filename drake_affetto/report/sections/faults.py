@@ -27,14 +27,12 @@ def make(data: ReportData) -> Section | None:
 def _statement(results: FaultsResults) -> Statement:
     detected = sum(row.detected for row in results.rows)
     harmed = sum(row.harmed for row in results.rows)
-    good = not (
-        results.false_success or results.missed or results.beyond_limit
-    )
+    good = not (results.false_success or results.missed or results.beyond_limit)
     text = (
         f"{detected} were noticed and ended as not valid. "
         "Heard as a hit without contact of hand and head: "
-        f"{results.false_success}. Of {harmed} in which the fault changed the outcome, {results.missed} "
-        "went unnoticed. A force above "
+        f"{results.false_success}. Of {harmed} in which the fault changed the "
+        f"outcome, {results.missed} went unnoticed. A force above "
         f"{results.force_limit:g} N came up in {results.beyond_limit} trials."
     )
     return Statement(
