@@ -61,7 +61,8 @@ class FaultsCommand(StudyCommand[FaultsPlan]):
         from rich.table import Table
 
         table = Table(title=f"Faults, {results.repeats} trials each")
-        for column in ("fault", "size", "success", "false", "detected"):
+        table.add_column("fault", no_wrap=True)
+        for column in ("size", "success", "false", "detected"):
             table.add_column(column)
         for column in ("after [s]", "missed", "force [N]", "speed [rad/s]"):
             table.add_column(column, justify="right")

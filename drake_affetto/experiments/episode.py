@@ -3,6 +3,8 @@
 Each trial runs the whole station. A `TrialRunner` builds its Diagram once;
 trials change the context only, and what a trial gives depends on its
 arguments alone, not on the trials before it.
+
+Long: all that one runner does with its one Diagram.
 """
 
 from collections.abc import Callable, Sequence

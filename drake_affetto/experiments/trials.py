@@ -17,6 +17,8 @@ kinds are
     watched        the whole chain with faults, as far as the supervisor lets it
 
 and `drake_affetto.experiments.results` has the result of each.
+
+Long: all kinds of trial stand side by side.
 """
 
 from collections.abc import Callable, Container, Mapping, Sequence

@@ -66,10 +66,11 @@ def _run(
     xy, seed = np.array(spec["xy"]), spec["seed"]
     gaze = trials.gaze(xy, seed)
     begin = trials.context.get_time() - gaze.duration
-    if not gaze.found and trials.verdict.valid:
-        # A gaze that does not come to rest is the robot's own failure.
-        if not trials.port("camera.blob")[2]:
-            injection.lost()
+    seen = bool(trials.port("camera.blob")[2])
+    # A gaze that sees the marker but does not come to rest is the robot's own
+    # failure.
+    if not (gaze.found or seen) and trials.verdict.valid:
+        injection.lost()
     recording = None
     value = 0.0
     start = math.inf
