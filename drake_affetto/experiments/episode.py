@@ -411,6 +411,8 @@ class TrialRunner:
                 self._copy(self.context, end)
             self._looked = _Look(key, outcome, end)
         self._copy(self._looked.end, self.context)
+        if self.injection is not None:
+            self.injection.resume()
         self._clear_logs()
         self.simulator.Initialize()
         return self._looked.outcome
@@ -420,6 +422,14 @@ class TrialRunner:
         self.station.gaze.reset(self._sub(self.station.gaze))
         self.simulator.Initialize()
         return self._wait_for_gaze(self.context.get_time())
+
+    def check_stroke(
+        self, gaze: GazeOutcome, recording: Recording, heard: bool
+    ) -> Verdict:
+        """What is said of a stroke that has just ended; see `verdict`."""
+        if self.injection is not None:
+            self.injection.afterwards(gaze, recording, heard)
+        return self.verdict
 
     def palm_path(self, state: Array) -> Array:
         """Positions (T, 3) of the palm, m in the world.

@@ -94,6 +94,24 @@ class FaultInjection:
                 return Verdict(REASONS[check], self._late_time)
         return Verdict()
 
+    def marks(self) -> tuple[list[tuple[str, float, float]], float]:
+        """The trial's faults by name, with their begin and end, for a plot.
+
+        Returns:
+            They, and when the supervisor spoke, all in s since the movement's
+            start; infinite: never.
+        """
+        root = self._runner.context
+        schedule = self._wiring.schedule(root)
+        start = self._wiring.movement(root)
+        spans = []
+        for fault in schedule.faults:
+            begin, end = fault.span(schedule.begin, start)
+            of = f" {fault.joint} {fault.channel}".rstrip()
+            name = fault.kind.replace("_", " ") + of.replace("_", " ")
+            spans.append((name, begin - start, end - start))
+        return spans, self.verdict.time - start
+
     @property
     def scores(self) -> Array:
         """Greatest score of each check so far, see `faults.supervision`."""
@@ -157,6 +175,27 @@ class FaultInjection:
             apart = np.linalg.norm(after.task_parameter - before.task_parameter)
             score = float(apart) / supervisor.parameters.moved
         self._say({Check.DRUM_MOVED: min(score, 100.0)})
+
+    def resume(self) -> None:
+        """Goes on from the end of a look that is shared by several trials."""
+        self._late, self._late_time = {}, math.inf
+
+    def afterwards(
+        self, gaze: "GazeOutcome", recording: "Recording", heard: bool
+    ) -> None:
+        """Judges a stroke that has just ended: by ear, and by a second look.
+
+        Args:
+            gaze: What the gaze found before.
+            recording: Recording of the movement.
+            heard: Whether the reward calls it a success.
+        """
+        if not self.verdict.valid:
+            return
+        self.listen(recording, gaze.task_parameter, heard)
+        # A miss is only believed at a drum that is where it was seen.
+        if not heard and self._wiring.supervisor and self.verdict.valid:
+            self.look_again(gaze, self._runner.look_again())
 
     def lost(self) -> None:
         """The gaze has given up: there is nothing to judge."""

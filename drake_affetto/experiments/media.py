@@ -4,8 +4,10 @@ The trials shown are run here once more, in this process and with Meshcat
 recording them; they are the same simulations that the results come from.
 """
 
+from collections.abc import Sequence
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import cv2
 import matplotlib
@@ -209,6 +211,7 @@ def draw_trial(
     for axis in axes:
         axis.grid(alpha=0.3)
         axis.margins(x=0.01)
+    _draw_faults(trials, axes)
     verdict = "hit" if reward > trials.reward_config.threshold else "miss"
     tau = ", ".join(f"{value:.3f}" for value in gaze.task_parameter)
     figure.suptitle(
@@ -216,3 +219,38 @@ def draw_trial(
     )
     with atomic_path(path) as fresh:
         figure.savefig(fresh, dpi=110)
+
+
+def _draw_faults(trials: TrialRunner, axes: Sequence[Any]) -> None:
+    """Shades when faults act, and marks when the supervisor spoke."""
+    if trials.injection is None:
+        return
+    spans, spoken = trials.injection.marks()
+    low, high = axes[-1].get_xlim()
+    for name, begin, end in spans:
+        if begin > high or end < low:
+            continue
+        for axis in axes:
+            axis.axvspan(
+                max(begin, low), min(end, high), color="tab:red", alpha=0.12
+            )
+        axes[0].text(
+            max(begin, low),
+            0.02,
+            f" {name}",
+            color="tab:red",
+            fontsize=8,
+            transform=axes[0].get_xaxis_transform(),
+        )
+    if low <= spoken <= high:
+        for axis in axes:
+            axis.axvline(spoken, color="tab:red", ls="--", lw=1)
+        axes[1].text(
+            spoken,
+            0.02,
+            f" not valid: {trials.verdict.reason}",
+            color="tab:red",
+            fontsize=8,
+            transform=axes[1].get_xaxis_transform(),
+        )
+    axes[-1].set_xlim(low, high)

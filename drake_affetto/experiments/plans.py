@@ -41,6 +41,8 @@ class DrumPlan(Plan):
         active: Whether the skill's own order is tried too.
         after: Numbers of demonstrations after which the skill is tested; empty
             for every one. After the last it always is.
+        repeat_invalid: How often a trial that the supervisor does not pass is
+            repeated, with another seed.
         scenario: Scenario, by name or path.
         seed: Seed of everything that is random.
     """
@@ -62,6 +64,12 @@ class DrumPlan(Plan):
     )
     after: tuple[int, ...] = number(
         (), 1, 1000, "test the skill only after so many demonstrations"
+    )
+    repeat_invalid: int = number(
+        0,
+        0,
+        100,
+        "repeat trials that the supervisor does not pass so often",
     )
     scenario: str = option("drumming", "scenario, by name or YAML file")
     seed: int = number(0, 0, GREATEST_SEED, "seed of everything that is random")
@@ -104,6 +112,8 @@ class MirrorPlan(Plan):
         variability: Factor of the teacher's variation.
         workspace: Share of the region's length and width that is used.
         direct: Scenario in which the skill is learned.
+        repeat_invalid: How often a trial that the supervisor does not pass is
+            repeated, with another seed.
         name: Name of this plan among others in one store, for display.
         seed: Seed of everything that is random.
     """
@@ -133,6 +143,12 @@ class MirrorPlan(Plan):
     variability: float = number(1.0, 0.0, 10.0)
     workspace: float = number(1.0, 0.05, 1.0)
     direct: str = "drumming"
+    repeat_invalid: int = number(
+        0,
+        0,
+        100,
+        "repeat trials that the supervisor does not pass so often",
+    )
     name: str = ""
     seed: int = number(0, 0, GREATEST_SEED, "seed of everything that is random")
 

@@ -23,6 +23,7 @@ from drake_affetto.experiments.trials import (
     run_trial,
     runner_of,
 )
+from drake_affetto.experiments.watched import record_watched
 from drake_affetto.runner.executor import Spec
 
 
@@ -170,6 +171,8 @@ def _record(trials: TrialRunner, spec: Spec) -> Recording | None:
     xy = np.array(spec["xy"])
     if kind == "strike":
         return trials.drum(xy, Movement(spec["theta"]), seed)[1]
+    if kind == "watched":
+        return record_watched(trials, spec)[1]
     if kind == "demonstration":
         done: Any = run_trial(spec)
         if done.success:

@@ -463,7 +463,8 @@ def demonstrate(
         q=empty,
         prototype=empty,
     )
-    if not gaze.found:
+    # What is not valid teaches nothing.
+    if not gaze.found or not trials.verdict.valid:
         return result
     prototypes = trials.tap_prototypes()
     while not result.success:
@@ -477,7 +478,8 @@ def demonstrate(
         result = dataclasses.replace(
             result,
             attempts=attempt + 1,
-            success=bool(value > trials.reward_config.threshold),
+            success=bool(value > trials.reward_config.threshold)
+            and trials.verdict.valid,
             max_pull=max(result.max_pull, movement.max_pull),
         )
         if value > result.reward or attempt == 0:
@@ -511,15 +513,19 @@ def _run_drumming(trials: TrialRunner, spec: Spec) -> DrummingResult:
     )
     contact = {"max_force": 0.0, "impulse": 0.0}
     value = 0.0
+    verdict = trials.verdict
     if recording is not None:
         contact = _contact(recording)
         value = trials.reward(recording, spec["prototypes"])
+        heard = bool(value > trials.reward_config.threshold)
+        verdict = trials.check_stroke(gaze, recording, heard)
     return DrummingResult(
         found=gaze.found,
         tau=gaze.task_parameter.tolist(),
         reward=value,
-        success=bool(value > trials.reward_config.threshold),
+        success=bool(value > trials.reward_config.threshold) and verdict.valid,
         **contact,
+        invalid=verdict.reason,
     )
 
 
@@ -530,7 +536,11 @@ def _run_look(trials: TrialRunner, spec: Spec) -> GazeResult:
 
 def _run_strike(trials: TrialRunner, spec: Spec) -> StrikeResult:
     xy = np.array(spec["xy"])
-    _, recording = trials.drum(xy, Movement(spec["theta"]), spec["seed"])
+    gaze, recording = trials.drum(xy, Movement(spec["theta"]), spec["seed"])
+    if recording is None and not trials.verdict.valid:
+        nothing = np.zeros(0, dtype=np.float32)
+        reason = trials.verdict.reason
+        return StrikeResult(0.0, False, 0.0, 0.0, 0.0, False, nothing, reason)
     if recording is None:
         raise InputError(
             f"the drum at {xy.round(3).tolist()} is not found, so there is no "
@@ -539,13 +549,16 @@ def _run_strike(trials: TrialRunner, spec: Spec) -> StrikeResult:
     trace = reward_over_time(trials.spectrogram(recording), spec["prototypes"])
     value = trials.reward(recording, spec["prototypes"])
     landing = trials.landing(recording)
+    heard = bool(value > trials.reward_config.threshold)
+    verdict = trials.check_stroke(gaze, recording, heard)
     return StrikeResult(
         reward=value,
-        success=bool(value > trials.reward_config.threshold),
+        success=heard and verdict.valid,
         **_contact(recording),
         landing=landing.distance,
         graze=landing.graze,
         reward_over_time=trace.astype(np.float32),
+        invalid=verdict.reason,
     )
 
 

@@ -40,24 +40,23 @@ def run_watched(trials: TrialRunner, spec: Any) -> WatchedResult:
         trials.scenario.supervisor.enabled,
         "true, for trials with faults",
     )
-    assert injection is not None
-    faults = [Fault(**each) for each in spec["faults"]]
-    for i, fault in enumerate(faults):
-        fault.check(f"faults[{i}]", trials.scenario.active_joints)
-    usual, injection.faults = injection.faults, faults
-    try:
-        return _run(trials, injection, spec)[0]
-    finally:
-        injection.faults = usual
+    return record_watched(trials, spec)[0]
 
 
 def record_watched(
     trials: TrialRunner, spec: Any
 ) -> tuple[WatchedResult, Recording | None]:
     """The same with the recording; None where nothing was struck."""
-    assert trials.injection is not None
-    trials.injection.faults = [Fault(**each) for each in spec["faults"]]
-    return _run(trials, trials.injection, spec)
+    injection = trials.injection
+    assert injection is not None
+    faults = [Fault(**each) for each in spec["faults"]]
+    for i, fault in enumerate(faults):
+        fault.check(f"faults[{i}]", trials.scenario.active_joints)
+    usual, injection.faults = injection.faults, faults
+    try:
+        return _run(trials, injection, spec)
+    finally:
+        injection.faults = usual
 
 
 def _run(
@@ -85,10 +84,7 @@ def _run(
         value = trials.reward(recording, spec["prototypes"])
     heard = bool(value > trials.reward_config.threshold)
     if recording is not None and trials.verdict.valid:
-        injection.listen(recording, gaze.task_parameter, heard)
-        if trials.verdict.valid and not heard:
-            # A miss is only believed at a drum that is where it was seen.
-            injection.look_again(gaze, trials.look_again())
+        injection.afterwards(gaze, recording, heard)
     else:
         trials.advance(trials.context.get_time() + _AFTERWARDS)
     after = _greatest(trials)

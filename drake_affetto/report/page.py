@@ -150,6 +150,8 @@ def _title(data: ReportData) -> str:
         return "A drumming skill, seen otherwise"
     if data.results("tune") and not data.results("toy"):
         return "Gains of the controllers, tuned on the whole robot"
+    if data.results("faults") and not data.results("toy"):
+        return "A drumming robot when something fails"
     return "Transfer of a skill to inputs it has never seen"
 
 
@@ -162,6 +164,9 @@ def _story(data: ReportData) -> str:
     tuned = data.results("tune")
     if tuned and not parts:
         parts.append(wording.tuning_gain(tuned) + ".")
+    faults = data.results("faults")
+    if faults and not parts:
+        parts.append(wording.faults_noticed(faults) + ".")
     if not parts:
         parts.append(
             "How schemes of learning and transfer fare under other conditions."

@@ -65,5 +65,5 @@ def test_lost_commands_never_come():
 
 
 def test_what_does_not_fit_is_named():
-    with pytest.raises(InputError, match="lag is 0.01"):
+    with pytest.raises(InputError, match=r"lag is 0\.01"):
         CommandLink(2, T, 0.01)

@@ -20,9 +20,11 @@ from drake_affetto.faults.supervision import (
 from drake_affetto.pneumatics.chamber import memory_size
 from drake_affetto.sensing.readings import (
     SensorParameters,
-    memory_size as filter_size,
     noise_block,
     read_sensors,
+)
+from drake_affetto.sensing.readings import (
+    memory_size as filter_size,
 )
 from support.actuator_bench import Actuators, make_parameters
 
