@@ -386,6 +386,7 @@ TESTED_IN = {
     "envs/scene_picture": "envs/test_drum.py",
     "experiments/fault_injection": "experiments/test_watched.py",
     "experiments/media": "experiments/test_demo.py",
+    "experiments/recordings": "experiments/test_episode.py",
     "experiments/results": "experiments/results/test_study.py",
     "faults/camera_faults": "station/test_fault_wiring.py",
     "faults/fault_source": "station/test_fault_wiring.py",

@@ -2,11 +2,14 @@
 
 from collections.abc import Sequence
 import math
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, Diagram
 
 from drake_affetto.common.typing import Array
+from drake_affetto.experiments.recordings import GazeOutcome, Recording
 from drake_affetto.faults.config import Fault
 from drake_affetto.faults.hearing import sound_scores
 from drake_affetto.faults.sounds import with_faults
@@ -15,13 +18,26 @@ from drake_affetto.faults.supervisor import Verdict
 from drake_affetto.perception.camera_model import CameraModel
 from drake_affetto.perception.plant_camera_model import make_camera_model
 from drake_affetto.scene import world
+from drake_affetto.sound.voice import DrumVoice
+from drake_affetto.station.scenario import Scenario
+from drake_affetto.station.station import AffettoStation
 
-if TYPE_CHECKING:
-    from drake_affetto.experiments.episode import (
-        GazeOutcome,
-        Recording,
-        TrialRunner,
-    )
+
+class Runner(Protocol):
+    """What of a `TrialRunner` is needed here."""
+
+    station: AffettoStation
+    scenario: Scenario
+    context: Context
+    simulator: Simulator
+    diagram: Diagram
+    voice: DrumVoice
+
+    def palm_path(self, state: Array) -> Array:
+        """Positions (T, 3) of the palm, m."""
+
+    def look_again(self) -> GazeOutcome:
+        """Searches for the drum once more."""
 
 
 class FaultInjection:
@@ -35,7 +51,7 @@ class FaultInjection:
         faults: Faults of the trials to come.
     """
 
-    def __init__(self, runner: "TrialRunner"):
+    def __init__(self, runner: Runner):
         """Takes the runner; the faults are those of its scenario."""
         wiring = runner.station.faults
         assert wiring is not None
@@ -129,7 +145,7 @@ class FaultInjection:
         for check, score in found.items():
             self._late[check] = max(self._late.get(check, 0.0), score)
 
-    def listen(self, recording: "Recording", tau: Array, heard: bool) -> None:
+    def listen(self, recording: Recording, tau: Array, heard: bool) -> None:
         """Compares what was heard with where the hand was.
 
         Args:
@@ -165,7 +181,7 @@ class FaultInjection:
             )
         )
 
-    def look_again(self, before: "GazeOutcome", after: "GazeOutcome") -> None:
+    def look_again(self, before: GazeOutcome, after: GazeOutcome) -> None:
         """Compares where the drum was seen before and after the movement."""
         supervisor = self._wiring.supervisor
         if supervisor is None or not before.found:
@@ -181,7 +197,7 @@ class FaultInjection:
         self._late, self._late_time = {}, math.inf
 
     def afterwards(
-        self, gaze: "GazeOutcome", recording: "Recording", heard: bool
+        self, gaze: GazeOutcome, recording: Recording, heard: bool
     ) -> None:
         """Judges a stroke that has just ended: by ear, and by a second look.
 

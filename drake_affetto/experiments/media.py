@@ -17,11 +17,8 @@ from numpy.typing import ArrayLike
 from pydrake.geometry import Meshcat, MeshcatParams, MeshcatVisualizerParams
 
 from drake_affetto.common.output import atomic_path, write_bytes_atomic
-from drake_affetto.experiments.episode import (
-    GazeOutcome,
-    Recording,
-    TrialRunner,
-)
+from drake_affetto.experiments.episode import TrialRunner
+from drake_affetto.experiments.recordings import GazeOutcome, Recording
 from drake_affetto.scene.view import set_default_camera_pose
 from drake_affetto.skill.policy import Regressor
 from drake_affetto.sound.wav import write_wav

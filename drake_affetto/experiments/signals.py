@@ -13,7 +13,8 @@ import numpy as np
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.output import atomic_path
 from drake_affetto.common.typing import Array
-from drake_affetto.experiments.episode import Recording, TrialRunner
+from drake_affetto.experiments.episode import TrialRunner
+from drake_affetto.experiments.recordings import Recording
 from drake_affetto.experiments.results.trial import TrialResult
 from drake_affetto.experiments.tables import open_store
 from drake_affetto.experiments.trials import (

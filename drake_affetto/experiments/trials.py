@@ -31,15 +31,12 @@ from drake_affetto import __version__
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.fingerprint import files_digest
 from drake_affetto.common.resources import models_dir
-from drake_affetto.experiments.episode import (
-    GuidedMovement,
-    Recording,
-    TrialRunner,
-)
+from drake_affetto.experiments.episode import GuidedMovement, TrialRunner
 from drake_affetto.experiments.mirror_looks import (
     look_at_ellipse,
     look_at_hand,
 )
+from drake_affetto.experiments.recordings import Recording
 from drake_affetto.experiments.results.trial import (
     DemonstrationResult,
     DrummingResult,

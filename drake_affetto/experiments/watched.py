@@ -11,12 +11,9 @@ import numpy as np
 
 from drake_affetto.common.errors import require
 from drake_affetto.common.typing import Array
-from drake_affetto.experiments.episode import (
-    FRAME_PERIOD,
-    Recording,
-    TrialRunner,
-)
+from drake_affetto.experiments.episode import FRAME_PERIOD, TrialRunner
 from drake_affetto.experiments.fault_injection import FaultInjection
+from drake_affetto.experiments.recordings import Recording
 from drake_affetto.experiments.results.trial import WatchedResult
 from drake_affetto.faults.config import Fault
 

@@ -11,12 +11,13 @@ from rich.console import Console
 
 from drake_affetto.cli import main as cli
 from drake_affetto.experiments import mouse_teaching
-from drake_affetto.experiments.episode import GazeOutcome, GuidedMovement
+from drake_affetto.experiments.episode import GuidedMovement
 from drake_affetto.experiments.mouse_teaching import (
     camera_pose_for_stroke,
     teach_by_mouse,
 )
 from drake_affetto.experiments.plans import TeachPlan
+from drake_affetto.experiments.recordings import GazeOutcome
 from drake_affetto.experiments.teaching_session import TeachingSession
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.motion.dmp_config import DmpConfig
