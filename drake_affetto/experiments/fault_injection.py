@@ -1,6 +1,7 @@
 """Faults in the trials of a runner: begun, heard, and seen again afterwards."""
 
 from collections.abc import Sequence
+import dataclasses
 import math
 from typing import Protocol
 
@@ -238,11 +239,16 @@ class FaultInjection:
         if self._sight is None:
             plant = self._runner.station.plant
             root = self._runner.diagram.CreateDefaultContext()
-            self._sight = make_camera_model(
+            sight = make_camera_model(
                 plant,
                 plant.GetMyContextFromRoot(root),
                 scenario.camera,
                 scenario.yaw_joint,
+            )
+            # As the robot knows it: the model's drum, not this body's.
+            self._sight = dataclasses.replace(
+                sight,
+                marker_height=sight.marker_height - scenario.body.drum_height,
             )
         v = scenario.blob.calibration.pixels(np.array([0.0, tau[0]]))[1]
         u = self._sight.camera.image_center[0]

@@ -232,6 +232,14 @@ class AffettoStation(Diagram):
         """A context at the start posture."""
         context = super().CreateDefaultContext()
         self.reset(context)
+        if self.faults is not None:
+            # Whoever simulates a larger diagram begins them there.
+            self.faults.begin(
+                context,
+                self.scenario.faults,
+                self.scenario.random_seed,
+                self.drum_position(context),
+            )
         return context
 
     def reset(self, context: Context) -> None:

@@ -19,6 +19,7 @@ from drake_affetto.experiments.mouse_teaching import (
 from drake_affetto.experiments.plans import TeachPlan
 from drake_affetto.experiments.recordings import GazeOutcome
 from drake_affetto.experiments.teaching_session import TeachingSession
+from drake_affetto.faults.supervisor import Verdict
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.motion.dmp_config import DmpConfig
 from drake_affetto.sound.reward import RewardConfig
@@ -120,6 +121,7 @@ class Rewards:
     """In place of the robot: replays sound as they are told to."""
 
     reward_config = RewardConfig()
+    verdict = Verdict()
 
     def __init__(self, rewards, unseen=()):
         self.rewards, self.unseen = iter(rewards), iter(unseen)

@@ -193,6 +193,19 @@ def test_faults_need_sensors_that_can_fail():
         scenario(faults=[elbow("joint_stuck")], variation=calm).check("s")
 
 
+def test_a_scenarios_own_faults_act_from_the_start():
+    usual = load_scenario("supervised")
+    failing = AffettoStation(
+        dataclasses.replace(usual, faults=[elbow("joint_offset", 0.3)])
+    )
+    simulator = Simulator(failing, failing.CreateDefaultContext())
+    failing.faults.watch(simulator.get_mutable_context(), True)
+    simulator.AdvanceTo(0.3)
+    told = failing.faults.verdict(simulator.get_context())
+    assert "jumps" in told.reason
+    assert told.time == pytest.approx(0.2, abs=0.011)
+
+
 def test_only_faults_and_supervisor_change_a_scenarios_content():
     plain = content_of(scenario())[0]
     assert content_of(scenario(faults=[elbow("joint_stuck")]))[0] != plain
