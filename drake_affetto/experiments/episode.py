@@ -41,8 +41,8 @@ from drake_affetto.station.scenario import Scenario
 from drake_affetto.station.station import AffettoStation
 from drake_affetto.teaching.stroke import draw_stroke
 
-# Time after a movement that is recorded too, s: a struck drum rings on.
-_RINGING = 0.3
+RINGING = 0.3
+"""Time after a movement that is recorded too, s: a struck drum rings on."""
 
 # Steps in which a search with the gaze is simulated, s.
 FRAME_PERIOD = 0.05
@@ -509,7 +509,7 @@ class TrialRunner:
             start: Time of the movement's start, s.
             seed: Seed of the microphone's noise.
         """
-        self.advance(self.context.get_time() + _RINGING)
+        self.advance(self.context.get_time() + RINGING)
         t, contact = self.log("drum.contact_force")
         _, knock = self.log("drum.knock_force")
         _, flow = self.log("affetto.mass_flow")

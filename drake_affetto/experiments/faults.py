@@ -9,9 +9,11 @@ contact in the recording, of which neither skill, reward nor supervisor know.
 from collections import Counter
 from collections.abc import Mapping, Sequence
 import dataclasses
+import math
 
 import numpy as np
 
+from drake_affetto.experiments.episode import RINGING
 from drake_affetto.experiments.fault_catalog import FaultCatalog, load_catalog
 from drake_affetto.experiments.plans import FaultsPlan
 from drake_affetto.experiments.results.faults import (
@@ -87,8 +89,13 @@ def run_faults(executor: TrialExecutor, plan: FaultsPlan) -> FaultsResults:
     )
     tests = _plan_tests(plan, catalog, skill, stack_prototypes(demonstrations))
     outcomes = run_trials(executor, "Drumming with faults", tests)
-    hit = load_sound_config(scenario.sound).hit_impulse
-    return make_results(plan, catalog, outcomes, hit)
+    return make_results(
+        plan,
+        catalog,
+        outcomes,
+        load_sound_config(scenario.sound).hit_impulse,
+        scenario.dmp.duration + RINGING,
+    )
 
 
 def _plan_tests(
@@ -127,6 +134,7 @@ def make_results(
     catalog: FaultCatalog,
     outcomes: Mapping[_Test, WatchedResult],
     hit_impulse: float,
+    length: float,
 ) -> FaultsResults:
     """What the trials come to.
 
@@ -135,6 +143,7 @@ def make_results(
         catalog: Faults of the study.
         outcomes: Results of its trials.
         hit_impulse: Impulse above which the head was hit, N s.
+        length: Length of a movement with what is recorded after it, s.
     """
     pairs: dict[int, list[tuple[WatchedResult, WatchedResult]]] = {}
     for test, result in outcomes.items():
@@ -142,7 +151,8 @@ def make_results(
             twin = outcomes[dataclasses.replace(test, faulted=False)]
             pairs.setdefault(test.cell, []).append((result, twin))
     rows = [
-        _row(catalog, cell, pairs[cell], hit_impulse) for cell in sorted(pairs)
+        _row(catalog, cell, pairs[cell], hit_impulse, length)
+        for cell in sorted(pairs)
     ]
     sound = _sound(
         [result for test, result in outcomes.items() if not test.faulted],
@@ -163,25 +173,38 @@ def make_results(
     )
 
 
-def _began(result: WatchedResult) -> bool:
-    """Whether a trial was ended, and its fault had begun by then."""
-    if result.detected_at is None or result.onset is None:
+def _began(result: WatchedResult, length: float) -> bool:
+    """Whether the fault of a trial began before the trial ended.
+
+    Args:
+        result: Result of the trial.
+        length: Length of a movement with what is recorded after it, s.
+    """
+    if result.onset is None:
         return False
-    # The supervisor looks at the tick at which a fault begins.
-    return result.detected_at >= result.onset - 1e-6
+    ends = [math.inf]
+    if result.movement_at is not None:
+        ends.append(result.movement_at + length)
+    if result.detected_at is not None:
+        # The supervisor looks at the tick at which a fault begins.
+        ends.append(result.detected_at + 1e-6)
+    return result.onset <= min(ends)
 
 
 def _row(
     catalog: FaultCatalog,
     cell: int,
-    pairs: Sequence[tuple[WatchedResult, WatchedResult]],
+    all_pairs: Sequence[tuple[WatchedResult, WatchedResult]],
     hit_impulse: float,
+    length: float,
 ) -> FaultRow:
     number, size = catalog.cells[cell]
     kind = catalog.faults[number].kind
+    # A fault that comes too late for a trial is none of it.
+    pairs = [pair for pair in all_pairs if _began(pair[0], length)]
     results = [result for result, _ in pairs]
     valid = [(r, twin) for r, twin in pairs if not r.invalid]
-    detected = [r for r in results if r.invalid and _began(r)]
+    detected = [r for r in results if r.invalid]
     times = [
         r.detected_at - r.onset
         for r in detected
@@ -200,12 +223,12 @@ def _row(
             r.heard and not hit for (r, _), hit in zip(valid, hits, strict=True)
         ),
         detected=len(detected),
-        early=sum(bool(r.invalid) for r in results) - len(detected),
+        early=sum(bool(r.invalid) for r, _ in all_pairs) - len(detected),
         harmed=sum(r.heard != twin.heard for r, twin in pairs),
         missed=sum(r.heard != twin.heard for r, twin in valid),
         detection_time=max(0.0, float(np.median(times))) if times else None,
-        max_force=max(r.max_force for r in results),
-        max_speed=max(r.max_speed for r in results),
+        max_force=max((r.max_force for r in results), default=0.0),
+        max_speed=max((r.max_speed for r in results), default=0.0),
         reasons=_reasons(results),
     )
 

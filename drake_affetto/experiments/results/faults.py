@@ -21,7 +21,7 @@ class FaultRow:
         kind: Kind of fault, one of `faults.config.KINDS`.
         size: Its size; None where the kind has none.
         unit: Unit of the size.
-        trials: All of them.
+        trials: Those in which the fault began before the trial was over.
         success: Valid, heard, and the head was hit.
         false_success: Valid and heard, but the head was not hit.
         detected: Ended as not valid after the fault began.
@@ -87,7 +87,7 @@ class FaultsResults(StudyResults):
         force_limit: Force that the robot must not exceed by itself, N.
         rows: Faults and sizes.
         sound: The same trials without faults.
-        faulted: Number of faulted trials.
+        faulted: Number of trials in which a fault began.
         false_success: Successes without a hit, of all trials with faults.
         missed: Trials whose outcome a fault has changed unnoticed.
         false_alarms: Ended as not valid without a fault, or before it began.
