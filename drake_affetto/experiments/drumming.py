@@ -41,7 +41,10 @@ from drake_affetto.experiments.skills import (
     task_parameters,
     teach_positions,
 )
-from drake_affetto.experiments.statistics import success_rate
+from drake_affetto.experiments.statistics import (
+    invalid_count,
+    success_rate,
+)
 from drake_affetto.experiments.trials import (
     Movement,
     draw_positions,
@@ -160,7 +163,9 @@ def run_drum(
     tests = _plan_tests(
         plan, scenarios, scenario, demonstrations, positions, seen
     )
-    strikes = run_strikes(executor, "Drumming at test positions", tests)
+    strikes = run_strikes(
+        executor, "Drumming at test positions", tests, plan.repeat_invalid
+    )
     outcomes = [
         _Outcome(
             test,
@@ -169,12 +174,17 @@ def run_drum(
             strikes[test],
         )
         for test in tests
+        # Neither judged nor learned from.
+        if not ((strike := strikes[test]) and strike.invalid)
     ]
     skilled = [each for each in outcomes if each.test.order != _BLIND]
     results = _make_results(plan, scenario, demonstrations, skilled)
     (blind,) = _curve(plan, (o for o in outcomes if o.test.order == _BLIND))
     return dataclasses.replace(
-        results, chance=blind.success_rate, bodies=robots.numbers()
+        results,
+        chance=blind.success_rate,
+        bodies=robots.numbers(),
+        invalid=invalid_count(strikes.values()),
     )
 
 
@@ -297,11 +307,19 @@ def _curve(plan: DrumPlan, outcomes: Iterable[_Outcome]) -> list[CurvePoint]:
     return [
         CurvePoint(
             n,
-            success_rate(by_count[n]),
-            np.mean(by_count[n], axis=1).tolist(),
+            success_rate(_padded(by_count[n])),
+            [float(np.mean(row)) for row in by_count[n] if row],
         )
         for n in sorted(by_count)
     ]
+
+
+def _padded(rows: Sequence[Sequence[bool]]) -> np.ndarray:
+    """A table of rows, NaN where trials of a repeat are not valid."""
+    table = np.full((len(rows), max(map(len, rows))), np.nan)
+    for line, row in zip(table, rows, strict=True):
+        line[: len(row)] = row
+    return table
 
 
 def demonstrations_needed(curve: Sequence[CurvePoint]) -> int | None:

@@ -17,11 +17,8 @@ from numpy.typing import ArrayLike
 from pydrake.geometry import Meshcat, MeshcatParams, MeshcatVisualizerParams
 
 from drake_affetto.common.output import atomic_path, write_bytes_atomic
-from drake_affetto.experiments.episode import (
-    GazeOutcome,
-    Recording,
-    TrialRunner,
-)
+from drake_affetto.experiments.episode import TrialRunner
+from drake_affetto.experiments.recordings import GazeOutcome, Recording
 from drake_affetto.scene.view import set_default_camera_pose
 from drake_affetto.skill.policy import Regressor
 from drake_affetto.sound.wav import write_wav
@@ -254,6 +251,7 @@ def draw_trial(
     for axis in axes:
         axis.grid(alpha=0.3)
         axis.margins(x=0.01)
+    _draw_faults(trials, axes)
     verdict = "hit" if reward > trials.reward_config.threshold else "miss"
     tau = ", ".join(f"{value:.3f}" for value in gaze.task_parameter)
     figure.suptitle(
@@ -261,3 +259,38 @@ def draw_trial(
     )
     with atomic_path(path) as fresh:
         figure.savefig(fresh, dpi=110)
+
+
+def _draw_faults(trials: TrialRunner, axes: Sequence[Any]) -> None:
+    """Shades when faults act, and marks when the supervisor spoke."""
+    if trials.injection is None:
+        return
+    spans, spoken = trials.injection.marks()
+    low, high = axes[-1].get_xlim()
+    for name, begin, end in spans:
+        if begin > high or end < low:
+            continue
+        for axis in axes:
+            axis.axvspan(
+                max(begin, low), min(end, high), color="tab:red", alpha=0.12
+            )
+        axes[0].text(
+            max(begin, low),
+            0.02,
+            f" {name}",
+            color="tab:red",
+            fontsize=8,
+            transform=axes[0].get_xaxis_transform(),
+        )
+    if low <= spoken <= high:
+        for axis in axes:
+            axis.axvline(spoken, color="tab:red", ls="--", lw=1)
+        axes[1].text(
+            spoken,
+            0.02,
+            f" not valid: {trials.verdict.reason}",
+            color="tab:red",
+            fontsize=8,
+            transform=axes[1].get_xaxis_transform(),
+        )
+    axes[-1].set_xlim(low, high)

@@ -40,6 +40,7 @@ from drake_affetto.experiments.statistics import (
     compare,
     compare_landing,
     correct_primary,
+    invalid_count,
     scheme_cell,
     success_table,
 )
@@ -232,7 +233,9 @@ def run_mirror(
                     mover,
                     repeat.prototypes,
                 )
-    outcomes = run_strikes(executor, f"Drumming, {title}", tests)
+    outcomes = run_strikes(
+        executor, f"Drumming, {title}", tests, plan.repeat_invalid
+    )
     first = repeats[0]
     return MirrorOutcome(
         results=_make_results(
@@ -336,7 +339,10 @@ def _make_results(
             strikes = _table(plan, outcomes, name, count)
             successes[name] = success_table(strikes)
             landings[name] = np.array(
-                [[s.landing if s else np.nan for s in row] for row in strikes]
+                [
+                    [s.landing if s and not s.invalid else np.nan for s in row]
+                    for row in strikes
+                ]
             )
             schemes.setdefault(name, {})[count] = scheme_cell(strikes)
         comparisons += compare(successes, count)
@@ -355,6 +361,7 @@ def _make_results(
         chance=scheme_cell(_table(plan, outcomes, _BLIND, 0)).success_rate,
         bodies=robots.numbers(),
         knowledge=_knowledge(plan),
+        invalid=invalid_count(outcomes.values()),
     )
 
 

@@ -43,6 +43,8 @@ class DrumPlan(Plan):
         active: Whether the skill's own order is tried too.
         after: Numbers of demonstrations after which the skill is tested; empty
             for every one. After the last it always is.
+        repeat_invalid: How often a trial that the supervisor does not pass is
+            repeated, with another seed.
         scenario: Scenario, by name or path.
         seed: Seed of everything that is random.
     """
@@ -64,6 +66,12 @@ class DrumPlan(Plan):
     )
     after: tuple[int, ...] = number(
         (), 1, 1000, "test the skill only after so many demonstrations"
+    )
+    repeat_invalid: int = number(
+        0,
+        0,
+        100,
+        "repeat trials that the supervisor does not pass so often",
     )
     scenario: str = option("drumming", "scenario, by name or YAML file")
     seed: int = number(0, 0, GREATEST_SEED, "seed of everything that is random")
@@ -106,6 +114,8 @@ class MirrorPlan(Plan):
         variability: Factor of the teacher's variation.
         workspace: Share of the region's length and width that is used.
         direct: Scenario in which the skill is learned.
+        repeat_invalid: How often a trial that the supervisor does not pass is
+            repeated, with another seed.
         name: Name of this plan among others in one store, for display.
         seed: Seed of everything that is random.
     """
@@ -135,6 +145,12 @@ class MirrorPlan(Plan):
     variability: float = number(1.0, 0.0, 10.0)
     workspace: float = number(1.0, 0.05, 1.0)
     direct: str = "drumming"
+    repeat_invalid: int = number(
+        0,
+        0,
+        100,
+        "repeat trials that the supervisor does not pass so often",
+    )
     name: str = ""
     seed: int = number(0, 0, GREATEST_SEED, "seed of everything that is random")
 
@@ -271,6 +287,35 @@ class DemoPlan(Plan):
             schemes=(*PAPER_SCHEMES, "transfer_default"),
             seed=self.seed,
         )
+
+
+@dataclasses.dataclass(frozen=True)
+class FaultsPlan(Plan):
+    """How many trials are run with faults.
+
+    Attributes:
+        repeats: Number of trials of each fault and size, and as many without.
+        demonstrations: Number of demonstrations that the skill is learned from.
+        scenario: Scenario with a supervisor, by name or path.
+        catalog: YAML file of the faults.
+        seed: Seed of everything that is random.
+    """
+
+    repeats: int = number(
+        10, 1, 1000, "trials of each fault and size, and as many without"
+    )
+    demonstrations: int = number(
+        25, 3, 1000, "number of demonstrations that the skill is learned from"
+    )
+    scenario: str = option(
+        "supervised", "scenario with a supervisor, by name or YAML file"
+    )
+    catalog: str = option(
+        "package://drake_affetto/faults.yaml",
+        "YAML file of the faults and their sizes",
+        metavar="FILE",
+    )
+    seed: int = number(0, 0, GREATEST_SEED, "seed of everything that is random")
 
 
 @dataclasses.dataclass(frozen=True)

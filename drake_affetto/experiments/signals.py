@@ -13,7 +13,8 @@ import numpy as np
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.output import atomic_path
 from drake_affetto.common.typing import Array
-from drake_affetto.experiments.episode import Recording, TrialRunner
+from drake_affetto.experiments.episode import TrialRunner
+from drake_affetto.experiments.recordings import Recording
 from drake_affetto.experiments.results.trial import TrialResult
 from drake_affetto.experiments.tables import open_store
 from drake_affetto.experiments.trials import (
@@ -23,6 +24,7 @@ from drake_affetto.experiments.trials import (
     run_trial,
     runner_of,
 )
+from drake_affetto.experiments.watched import record_watched
 from drake_affetto.runner.executor import Spec
 
 
@@ -170,6 +172,8 @@ def _record(trials: TrialRunner, spec: Spec) -> Recording | None:
     xy = np.array(spec["xy"])
     if kind == "strike":
         return trials.drum(xy, Movement(spec["theta"]), seed)[1]
+    if kind == "watched":
+        return record_watched(trials, spec)[1]
     if kind == "demonstration":
         done: Any = run_trial(spec)
         if done.success:

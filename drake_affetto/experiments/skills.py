@@ -43,6 +43,9 @@ if TYPE_CHECKING:
 # The least that a skill can be learned from.
 _FEWEST = 3
 
+# Of the seeds of strikes that are repeated.
+_AGAIN = 0xA6A1
+
 # A palm still sounds a drum of 8 cm from about so far beside its center, m;
 # and points along the region's box by which the best constant is chosen.
 _CHANCE_REACH = 0.05
@@ -235,7 +238,10 @@ def strike_if_seen(
 
 
 def run_strikes(
-    executor: TrialExecutor, label: str, tests: Mapping[Key, Spec | None]
+    executor: TrialExecutor,
+    label: str,
+    tests: Mapping[Key, Spec | None],
+    repeat_invalid: int = 0,
 ) -> dict[Key, StrikeResult | None]:
     """Runs the strikes of a study; None stays None.
 
@@ -243,12 +249,26 @@ def run_strikes(
         executor: Executor of the study.
         label: Name of this phase of the study.
         tests: Specs of `strike_if_seen`, by key.
+        repeat_invalid: How often a strike that the supervisor does not pass is
+            repeated, each time with another seed. What is not valid even then
+            keeps its reason: it is to be counted apart.
     """
-    strikes = run_trials(
-        executor,
-        label,
-        {test: spec for test, spec in tests.items() if spec is not None},
-    )
+    planned = {test: spec for test, spec in tests.items() if spec is not None}
+    strikes: dict[Key, StrikeResult] = run_trials(executor, label, planned)
+    for again in range(1, repeat_invalid + 1):
+        invalid = {
+            test: {
+                **planned[test],
+                "seed": trial_seed(planned[test]["seed"], _AGAIN, again),
+            }
+            for test, strike in strikes.items()
+            if strike.invalid
+        }
+        if not invalid:
+            break
+        strikes |= run_trials(
+            executor, f"{label}, not valid before, {again}", invalid
+        )
     return {test: strikes.get(test) for test in tests}
 
 

@@ -4,7 +4,7 @@ Trials come in repeats: those of one repeat share what was taught and learned,
 so they are not independent of each other. All here respects that.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 import dataclasses
 import itertools
 
@@ -37,8 +37,22 @@ def sounded(strike: StrikeResult | None) -> bool:
 def success_table(
     strikes: Sequence[Sequence[StrikeResult | None]],
 ) -> Array:
-    """1 where a strike sounded, else 0: a row a repeat, a column a trial."""
-    return np.array([[sounded(s) for s in row] for row in strikes], float)
+    """1 where a strike sounded, else 0: a row a repeat, a column a trial.
+
+    NaN where a strike is not valid: there is nothing to judge.
+    """
+    return np.array(
+        [
+            [np.nan if s and s.invalid else sounded(s) for s in row]
+            for row in strikes
+        ],
+        float,
+    )
+
+
+def invalid_count(strikes: Iterable[StrikeResult | None]) -> int:
+    """How many strikes the supervisor does not pass."""
+    return sum(bool(strike and strike.invalid) for strike in strikes)
 
 
 def scheme_cell(
@@ -53,10 +67,16 @@ def scheme_cell(
         InputError: If there is no strike.
     """
     successes = success_table(strikes)
-    flat = [strike for row in strikes for strike in row]
+    flat = [
+        strike
+        for row in strikes
+        for strike in row
+        if strike is None or not strike.invalid
+    ]
+    require(bool(flat), "strikes", "none that is valid", "at least one")
     return SchemeCell(
         success_rate(successes),
-        successes.mean(axis=1).tolist(),
+        _row_means(successes).tolist(),
         [s.reward if s else 0.0 for s in flat],
         [s.landing if s else None for s in flat],
         float(np.mean([s.graze if s else False for s in flat])),
@@ -72,7 +92,7 @@ def success_rate(successes: ArrayLike, level: float = 0.95) -> SuccessRate:
     are.
 
     Args:
-        successes: booleans (repeats, trials).
+        successes: booleans (repeats, trials); NaN where a trial is not valid.
         level: of confidence.
 
     Returns:
@@ -88,8 +108,10 @@ def success_rate(successes: ArrayLike, level: float = 0.95) -> SuccessRate:
         f"an array of shape {table.shape}",
         "repeats and trials, at least one of each",
     )
-    mean = float(table.mean())
-    n = table.size / _design_effect(table)
+    valid = np.isfinite(table)
+    require(bool(valid.any()), "successes", "none that is valid", "a trial")
+    mean = float(table[valid].mean())
+    n = np.count_nonzero(valid) / _design_effect(table)
     z = stats.norm.ppf(0.5 + 0.5 * level)
     middle = (mean + z**2 / (2.0 * n)) / (1.0 + z**2 / n)
     half = (z / (1.0 + z**2 / n)) * np.sqrt(
@@ -104,15 +126,29 @@ def success_rate(successes: ArrayLike, level: float = 0.95) -> SuccessRate:
 
 def _design_effect(table: np.ndarray) -> float:
     """How many times the variance of the mean exceeds that of a binomial."""
-    repeats, trials = table.shape
-    mean = table.mean()
+    valid = np.isfinite(table)
+    rows = _row_means(table)
+    repeats, mean = len(rows), table[valid].mean()
+    # Where some are not valid, as many as a repeat has in the mean.
+    trials = np.count_nonzero(valid) / repeats
     if repeats < 2:
         return 1.0
     if mean in (0.0, 1.0):
         return 1.0 + (trials - 1) * _ASSUMED_CORRELATION
-    between = table.mean(axis=1).var(ddof=1) / repeats
+    between = rows.var(ddof=1) / repeats
     binomial = mean * (1.0 - mean) / (repeats * trials)
     return float(np.clip(between / binomial, 1.0, trials))
+
+
+def _row_means(table: np.ndarray) -> Array:
+    """Mean of the valid trials of each repeat that has any."""
+    return np.array(
+        [
+            row[np.isfinite(row)].mean()
+            for row in table
+            if np.isfinite(row).any()
+        ]
+    )
 
 
 def paired_p(first: ArrayLike, second: ArrayLike) -> float:
@@ -232,6 +268,10 @@ def compare(
     rows: list[SchemeComparisonRow] = []
     for a, b in itertools.combinations(successes, 2):
         first, second = (np.asarray(successes[s], float) for s in (a, b))
+        # Pairs of which one is not valid say nothing.
+        both = np.isfinite(first) & np.isfinite(second)
+        if not both.all():
+            first, second = (np.where(both, t, 0.0) for t in (first, second))
         rows.append(
             SchemeComparisonRow(
                 a=a,

@@ -14,7 +14,8 @@ import numpy as np
 
 from drake_affetto.common.typed_json import from_plain, to_plain
 from drake_affetto.common.typing import Array
-from drake_affetto.experiments.episode import Recording, TrialRunner
+from drake_affetto.experiments.episode import TrialRunner
+from drake_affetto.experiments.recordings import Recording
 from drake_affetto.experiments.trials import (
     NAME,
     check_entry,

@@ -14,8 +14,11 @@ kinds are
     hand_look      the arm goes to a posture, at which the hand's marker is
                    looked for in the mirror
     ellipse_look   the gaze, then the shape of the drum's marker
+    watched        the whole chain with faults, as far as the supervisor lets it
 
 and `drake_affetto.experiments.results` has the result of each.
+
+Long: all kinds of trial stand side by side.
 """
 
 from collections.abc import Callable, Container, Mapping, Sequence
@@ -28,15 +31,12 @@ from drake_affetto import __version__
 from drake_affetto.common.errors import InputError
 from drake_affetto.common.fingerprint import files_digest
 from drake_affetto.common.resources import models_dir
-from drake_affetto.experiments.episode import (
-    GuidedMovement,
-    Recording,
-    TrialRunner,
-)
+from drake_affetto.experiments.episode import GuidedMovement, TrialRunner
 from drake_affetto.experiments.mirror_looks import (
     look_at_ellipse,
     look_at_hand,
 )
+from drake_affetto.experiments.recordings import Recording
 from drake_affetto.experiments.results.trial import (
     DemonstrationResult,
     DrummingResult,
@@ -48,6 +48,8 @@ from drake_affetto.experiments.results.trial import (
     pack,
     unpack,
 )
+from drake_affetto.experiments.watched import run_watched
+from drake_affetto.faults.config import Fault
 from drake_affetto.geometry.region import spread_inside
 from drake_affetto.perception.blob import BlobCalibration, BlobConfig
 from drake_affetto.runner.executor import Key, Result, Spec, TrialExecutor
@@ -308,6 +310,35 @@ def hand_look(
     )
 
 
+def watched(
+    scenario: str,
+    xy: Sequence[float],
+    seed: int,
+    regressor: Regressor,
+    prototypes: np.ndarray,
+    faults: Sequence[Fault] = (),
+) -> Spec:
+    """The spec of the whole chain with faults, watched by the supervisor.
+
+    Args:
+        scenario: Scenario with a supervisor, by name or path.
+        xy: Position of the drum (2,), m.
+        seed: Seed of the noise and of what is random in the faults.
+        regressor: Skill, from task parameters to parameters of a movement.
+        prototypes: Prototypes of the reward (N, bands, frames).
+        faults: Faults of the trial, in place of the scenario's.
+    """
+    return _spec(
+        "watched",
+        scenario,
+        xy=list(xy),
+        seed=seed,
+        regressor=regressor,
+        prototypes=np.asarray(prototypes, float),
+        faults=[dataclasses.asdict(each) for each in faults],
+    )
+
+
 def ellipse_look(scenario: str, xy: Sequence[float], seed: int) -> Spec:
     """The spec of a look at the shape of the drum's marker at xy."""
     return _spec("ellipse_look", scenario, xy=list(xy), seed=seed)
@@ -348,6 +379,7 @@ def run_trial(
         "strike": _run_strike,
         "hand_look": _run_hand_look,
         "ellipse_look": _run_ellipse_look,
+        "watched": run_watched,
     }
     kind = spec["kind"]
     if kind not in kinds:
@@ -430,7 +462,8 @@ def demonstrate(
         q=empty,
         prototype=empty,
     )
-    if not gaze.found:
+    # What is not valid teaches nothing.
+    if not gaze.found or not trials.verdict.valid:
         return result
     prototypes = trials.tap_prototypes()
     while not result.success:
@@ -444,7 +477,8 @@ def demonstrate(
         result = dataclasses.replace(
             result,
             attempts=attempt + 1,
-            success=bool(value > trials.reward_config.threshold),
+            success=bool(value > trials.reward_config.threshold)
+            and trials.verdict.valid,
             max_pull=max(result.max_pull, movement.max_pull),
         )
         if value > result.reward or attempt == 0:
@@ -478,15 +512,19 @@ def _run_drumming(trials: TrialRunner, spec: Spec) -> DrummingResult:
     )
     contact = {"max_force": 0.0, "impulse": 0.0}
     value = 0.0
+    verdict = trials.verdict
     if recording is not None:
         contact = _contact(recording)
         value = trials.reward(recording, spec["prototypes"])
+        heard = bool(value > trials.reward_config.threshold)
+        verdict = trials.check_stroke(gaze, recording, heard)
     return DrummingResult(
         found=gaze.found,
         tau=gaze.task_parameter.tolist(),
         reward=value,
-        success=bool(value > trials.reward_config.threshold),
+        success=bool(value > trials.reward_config.threshold) and verdict.valid,
         **contact,
+        invalid=verdict.reason,
     )
 
 
@@ -497,7 +535,11 @@ def _run_look(trials: TrialRunner, spec: Spec) -> GazeResult:
 
 def _run_strike(trials: TrialRunner, spec: Spec) -> StrikeResult:
     xy = np.array(spec["xy"])
-    _, recording = trials.drum(xy, Movement(spec["theta"]), spec["seed"])
+    gaze, recording = trials.drum(xy, Movement(spec["theta"]), spec["seed"])
+    if recording is None and not trials.verdict.valid:
+        nothing = np.zeros(0, dtype=np.float32)
+        reason = trials.verdict.reason
+        return StrikeResult(0.0, False, 0.0, 0.0, 0.0, False, nothing, reason)
     if recording is None:
         raise InputError(
             f"the drum at {xy.round(3).tolist()} is not found, so there is no "
@@ -506,13 +548,16 @@ def _run_strike(trials: TrialRunner, spec: Spec) -> StrikeResult:
     trace = reward_over_time(trials.spectrogram(recording), spec["prototypes"])
     value = trials.reward(recording, spec["prototypes"])
     landing = trials.landing(recording)
+    heard = bool(value > trials.reward_config.threshold)
+    verdict = trials.check_stroke(gaze, recording, heard)
     return StrikeResult(
         reward=value,
-        success=bool(value > trials.reward_config.threshold),
+        success=heard and verdict.valid,
         **_contact(recording),
         landing=landing.distance,
         graze=landing.graze,
         reward_over_time=trace.astype(np.float32),
+        invalid=verdict.reason,
     )
 
 

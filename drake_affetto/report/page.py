@@ -20,6 +20,7 @@ from drake_affetto.report.sections import (
     bodies,
     conditions,
     drumming,
+    faults,
     media,
     origin,
     paper,
@@ -44,6 +45,7 @@ _SECTIONS: tuple[Callable[[ReportData], Section | None], ...] = (
     scenarios.make,
     bodies.make,
     conditions.make,
+    faults.make,
     toy.make,
     tuning.make,
     paper.make,
@@ -152,6 +154,8 @@ def _title(data: ReportData) -> str:
         return "Other bodies, the same skill"
     if data.results("tune") and not data.results("toy"):
         return "Gains of the controllers, tuned on the whole robot"
+    if data.results("faults") and not data.results("toy"):
+        return "A drumming robot when something fails"
     return "Transfer of a skill to inputs it has never seen"
 
 
@@ -169,6 +173,9 @@ def _story(data: ReportData) -> str:
     tuned = data.results("tune")
     if tuned and not parts:
         parts.append(wording.tuning_gain(tuned) + ".")
+    faults = data.results("faults")
+    if faults and not parts:
+        parts.append(wording.faults_noticed(faults) + ".")
     if not parts:
         parts.append(
             "How schemes of learning and transfer fare under other conditions."

@@ -7,7 +7,11 @@ Every statement about which scheme is better is computed here from a
 from collections.abc import Iterable
 import dataclasses
 
-from drake_affetto.experiments.results import SuccessRate, ToyResults
+from drake_affetto.experiments.results import (
+    FaultsResults,
+    SuccessRate,
+    ToyResults,
+)
 from drake_affetto.report.comparison import Comparison, SchemeComparison
 from drake_affetto.tuning.results import TuningResults
 
@@ -126,6 +130,18 @@ def ordered(names: Iterable[str]) -> list[str]:
 def number(count: int, noun: str) -> str:
     """As "1 trial", "6 trials"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def faults_noticed(results: FaultsResults) -> str:
+    """As "of 590 trials with a fault, ... were counted as a hit by mistake"."""
+    return (
+        f"Of {number(results.faulted, 'trial')} with a fault of sensors, "
+        "valves, air, camera, microphone or surroundings, "
+        f"{results.false_success} were taken for a hit by mistake, and "
+        f"{results.missed} had another outcome without being noticed; of "
+        f"{results.sound.trials} without, {results.sound.false_alarms} were "
+        "ended by a false alarm"
+    )
 
 
 def joined(parts: list[str]) -> str:

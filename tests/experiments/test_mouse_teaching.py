@@ -11,13 +11,15 @@ from rich.console import Console
 
 from drake_affetto.cli import main as cli
 from drake_affetto.experiments import mouse_teaching
-from drake_affetto.experiments.episode import GazeOutcome, GuidedMovement
+from drake_affetto.experiments.episode import GuidedMovement
 from drake_affetto.experiments.mouse_teaching import (
     camera_pose_for_stroke,
     teach_by_mouse,
 )
 from drake_affetto.experiments.plans import TeachPlan
+from drake_affetto.experiments.recordings import GazeOutcome
 from drake_affetto.experiments.teaching_session import TeachingSession
+from drake_affetto.faults.supervisor import Verdict
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.motion.dmp_config import DmpConfig
 from drake_affetto.sound.reward import RewardConfig
@@ -119,6 +121,7 @@ class Rewards:
     """In place of the robot: replays sound as they are told to."""
 
     reward_config = RewardConfig()
+    verdict = Verdict()
 
     def __init__(self, rewards, unseen=()):
         self.rewards, self.unseen = iter(rewards), iter(unseen)

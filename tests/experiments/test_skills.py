@@ -6,6 +6,7 @@ import pytest
 from drake_affetto.common.errors import InputError
 from drake_affetto.experiments import skills
 from drake_affetto.experiments.results import GazeResult
+from drake_affetto.experiments.trials import strike
 from drake_affetto.runner.executor import TrialExecutor
 from drake_affetto.runner.store import TrialStore
 from drake_affetto.station.scenario import load_scenario
@@ -65,3 +66,34 @@ def test_a_drum_that_was_not_found_is_not_struck(executor):
     assert strikes[False] is None
     assert strikes[True].reward == 0.0
     assert executor._store.phases()[0].total == 1
+
+
+def sometimes_invalid(spec):
+    """Strikes of an even seed are not valid, whatever they sound like."""
+    result, arrays = fake_world.run(spec)
+    if spec["kind"] == "strike" and spec["seed"] % 2 == 0:
+        result = result | {"success": False, "invalid": "commands come late"}
+    return result, arrays
+
+
+def test_strikes_that_are_not_valid_are_repeated_with_another_seed(tmp_path):
+    theta, sounds = np.array([0.25, -0.1]), np.ones((1, 4, 5))
+    tests = {
+        seed: strike("drumming", [0.25, -0.1], seed, theta, sounds)
+        for seed in range(12)
+    }
+
+    def invalid(repeat):
+        with (
+            TrialStore(tmp_path / f"{repeat}.sqlite") as store,
+            TrialExecutor(
+                sometimes_invalid, store, workers=0, quiet=True
+            ) as executor,
+        ):
+            found = skills.run_strikes(executor, "strikes", tests, repeat)
+        assert list(found) == list(tests)
+        return [seed for seed, each in found.items() if each.invalid]
+
+    assert invalid(0) == [0, 2, 4, 6, 8, 10]
+    assert len(invalid(2)) < 6
+    assert invalid(20) == []

@@ -158,3 +158,19 @@ def test_a_cell_counts_what_was_not_struck_as_missed():
     assert cell.rewards == [0.4, 0.2, 0.1, 0.0]
     assert cell.landing == [0.01, 0.05, 0.09, None]
     assert cell.grazes == 0.25
+
+
+def test_trials_that_are_not_valid_count_neither_way():
+    nan = np.nan
+    found = success_rate([[1.0, nan, 0.0], [nan, 1.0, 1.0], [nan, nan, nan]])
+    without = success_rate([[1.0, 0.0], [1.0, 1.0]])
+    assert found == without
+    with pytest.raises(InputError, match="none that is valid"):
+        success_rate([[nan, nan]])
+    # A pair is compared only where both are valid.
+    a, b = (
+        np.array([[1.0, nan], [1.0, 0.0]]),
+        np.array([[0.0, 1.0], [1.0, nan]]),
+    )
+    (row,) = compare({"a": a, "b": b}, 3)
+    assert row.difference == pytest.approx(0.25)

@@ -7,7 +7,7 @@ import pytest
 
 from drake_affetto.common.errors import InputError
 from drake_affetto.experiments import trials
-from drake_affetto.experiments.episode import GazeOutcome
+from drake_affetto.experiments.recordings import GazeOutcome
 from drake_affetto.experiments.results import trial as results
 from drake_affetto.runner.store import trial_key
 from drake_affetto.station.scenario import load_scenario

@@ -16,6 +16,7 @@ SECTIONS = {
     "mirror": "Through the mirror",
     "scenarios": "Other changes of the view",
     "conditions": "When does transfer win?",
+    "faults": "When something fails",
     "toy": "The idea on a toy problem",
     "paper": "Beside the paper",
     "origin": "Where this comes from",
@@ -87,6 +88,7 @@ def test_demo_alone_makes_a_page(demo):
     assert set(made.sections()) == set(SECTIONS) - {
         "scenarios",
         "conditions",
+        "faults",
         "toy",
     }
     assert "7 of 8" in made.text

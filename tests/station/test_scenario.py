@@ -259,6 +259,14 @@ NAMED = {
         "pneumatics_robot.yaml",
         "pneumatics: {{overlays: [{}]}}",
     ),
+    "supervisor.parameters": (
+        "supervisor.yaml",
+        "supervisor: {{enabled: true, parameters: {}}}",
+    ),
+    "supervisor.overlays": (
+        "supervisor.yaml",
+        "supervisor: {{enabled: true, overlays: [{}]}}",
+    ),
     "variation.parameters": ("variation.yaml", "variation: {{parameters: {}}}"),
     "variation.overlays": (
         "variation_robot.yaml",

@@ -427,6 +427,56 @@ def toy(seed=0, seeds=6):
     }
 
 
+def faults(seed=0):
+    row = {
+        "unit": "rad",
+        "trials": 4,
+        "success": 1,
+        "false_success": 0,
+        "detected": 3,
+        "early": 0,
+        "harmed": 2,
+        "missed": 0,
+        "detection_time": 0.12,
+        "max_force": 7.5,
+        "max_speed": 2.5,
+        "reasons": {"angle reading jumps": 3},
+    }
+    return {
+        **head("faults", seed),
+        "scenario": "supervised",
+        "demonstrations": 25,
+        "repeats": 4,
+        "force_limit": 40.0,
+        "rows": [
+            row | {"kind": "joint_offset", "size": 0.1},
+            row
+            | {
+                "kind": "supply_lost",
+                "size": None,
+                "unit": "",
+                "missed": 1,
+                "detection_time": None,
+            },
+        ],
+        "sound": {
+            "trials": 8,
+            "success": {"mean": 0.97, "low": 0.9, "high": 1.0},
+            "false_success": 0,
+            "false_alarms": 1,
+            "reasons": {"joint does not follow": 1},
+            "max_force": 4.0,
+            "max_speed": 3.0,
+            "highest_scores": {"tracking": 0.6},
+        },
+        "faulted": 8,
+        "false_success": 0,
+        "missed": 1,
+        "false_alarms": 1,
+        "beyond_limit": 0,
+    }
+
+
 def tune(seed=0):
     joints = ("waist_yaw", "right_elbow_flexion")
 
@@ -612,4 +662,5 @@ def write_all(parent: Path) -> list[Path]:
         write(parent / "scenarios", scenarios()),
         write(parent / "conditions", conditions()),
         write(parent / "toy", toy()),
+        write(parent / "faults", faults()),
     ]

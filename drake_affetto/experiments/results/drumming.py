@@ -191,6 +191,8 @@ class DrumResults(StudyResults):
         chance: Success of the best constant stroke, played blind.
         bodies: How each repeat's robot departs from its model, by name of the
             number; empty where all are alike.
+        invalid: Number of trials that the supervisor did not pass: they are in
+            none of the other figures.
     """
 
     KIND: ClassVar[str] = "drum"
@@ -210,6 +212,7 @@ class DrumResults(StudyResults):
     similarity: SimilarityTraces | None = None
     chance: SuccessRate | None = None
     bodies: list[dict[str, float]] = field(default_factory=list)
+    invalid: int = field(default=0, metadata=COUNT)
 
     def check(self, where: str) -> None:
         """Raises InputError where parts do not fit each other."""

@@ -134,6 +134,8 @@ class MirrorResults(StudyResults):
             number; empty where all are alike.
         knowledge: How wrongly the optical map knows the camera, see
             `CalibrationError`; empty where the default's map is another one.
+        invalid: Number of trials that the supervisor did not pass: they are in
+            none of the other figures.
         self_calibration: How the robot finds the mirror by itself; None if it
             was not tried.
     """
@@ -154,6 +156,7 @@ class MirrorResults(StudyResults):
     chance: SuccessRate | None = None
     bodies: list[dict[str, float]] = field(default_factory=list)
     knowledge: dict[str, float] = field(default_factory=dict)
+    invalid: int = field(default=0, metadata=COUNT)
     self_calibration: SelfCalibrationResults | None = None
 
     def check(self, where: str) -> None:

@@ -80,6 +80,8 @@ class StrikeResult:
         graze: Whether it touches the head although it comes down beside it.
         reward_over_time: (frames,) similarity to the prototypes as they
             slide over the recording.
+        invalid: Why the supervisor does not pass the trial, which is then
+            neither judged nor learned from; empty: it does, or there is none.
     """
 
     KIND: ClassVar[str] = "strike"
@@ -92,6 +94,7 @@ class StrikeResult:
     landing: float = field(metadata=NOT_NEGATIVE)
     graze: bool
     reward_over_time: np.ndarray
+    invalid: str = ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -105,6 +108,7 @@ class DrummingResult:
         success: Whether the reward is above the threshold.
         max_force: Greatest force on the drum's head, N.
         impulse: Impulse on the drum's head, N s.
+        invalid: As in `StrikeResult`.
     """
 
     KIND: ClassVar[str] = "drumming"
@@ -116,6 +120,7 @@ class DrummingResult:
     success: bool
     max_force: float = field(metadata=NOT_NEGATIVE)
     impulse: float = field(metadata=NOT_NEGATIVE)
+    invalid: str = ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -155,6 +160,45 @@ class EllipseLookResult:
     moments: list[float] | None
 
 
+@dataclasses.dataclass(frozen=True)
+class WatchedResult:
+    """The whole chain with faults, watched by the supervisor.
+
+    Times are since the trial's beginning, when the robot rests.
+
+    Attributes:
+        found: Whether the gaze settled on the marker.
+        tau: Task parameter τ (2,).
+        reward: Reward from the sound; 0 without a movement.
+        heard: Whether it is above the threshold.
+        invalid: Why the supervisor does not pass the trial; empty: it does.
+        detected_at: When it said so, s; None: never.
+        onset: When the first fault began, s; None: none did.
+        movement_at: When the movement began, s; None: none did.
+        max_force: Greatest force on the drum or the table, N.
+        impulse: Impulse on the drum's head, N s.
+        max_speed: Greatest speed of a joint, rad/s.
+        scores: (checks,) greatest score of each check, see
+            `faults.supervision`.
+    """
+
+    KIND: ClassVar[str] = "watched"
+    ARRAYS: ClassVar[dict[str, int]] = {"scores": 1}
+
+    found: bool
+    tau: list[float] = field(metadata=TAU)
+    reward: float = field(metadata=REWARD)
+    heard: bool
+    invalid: str
+    detected_at: float | None
+    onset: float | None
+    movement_at: float | None
+    max_force: float = field(metadata=NOT_NEGATIVE)
+    impulse: float = field(metadata=NOT_NEGATIVE)
+    max_speed: float = field(metadata=NOT_NEGATIVE)
+    scores: np.ndarray
+
+
 TrialResult = (
     GazeResult
     | DemonstrationResult
@@ -162,6 +206,7 @@ TrialResult = (
     | DrummingResult
     | HandLookResult
     | EllipseLookResult
+    | WatchedResult
 )
 
 TRIAL_RESULTS: dict[str, Any] = {
@@ -173,15 +218,22 @@ TRIAL_RESULTS: dict[str, Any] = {
         DrummingResult,
         HandLookResult,
         EllipseLookResult,
+        WatchedResult,
     )
 }
 
 
 def pack(result: TrialResult) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """A trial's result as the plain data and the arrays of the store."""
+    """A trial's result as the plain data and the arrays of the store.
+
+    Fields at their default are left out: a result is stored as it was before
+    there were such fields.
+    """
     values = {
         each.name: getattr(result, each.name)
         for each in dataclasses.fields(result)
+        if each.default is dataclasses.MISSING
+        or getattr(result, each.name) != each.default
     }
     arrays = {name: values.pop(name) for name in result.ARRAYS}
     return to_plain(values), arrays
@@ -209,7 +261,13 @@ def unpack(
         raise InputError(f"no kind of trial is called {kind!r}")
     result = TRIAL_RESULTS[kind]
     hints = get_type_hints(result)
-    known = {each.name: each.metadata for each in dataclasses.fields(result)}
+    fields = dataclasses.fields(result)
+    known = {each.name: each.metadata for each in fields}
+    defaults = {
+        each.name: each.default
+        for each in fields
+        if each.default is not dataclasses.MISSING
+    }
     other = sorted({*plain, *arrays} - {*known})
     if other:
         raise InputError(f"{where}a {kind} has no field {other[0]!r}")
@@ -217,6 +275,9 @@ def unpack(
     for name in known:
         place = f"{where}{name}"
         found = arrays if name in result.ARRAYS else plain
+        if name not in found and name in defaults:
+            values[name] = defaults[name]
+            continue
         if name not in found:
             raise InputError(f"{place} is missing")
         if found is plain:

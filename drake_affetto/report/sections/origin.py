@@ -16,6 +16,7 @@ _STUDIES = {
     "scenarios": "the schemes in all changed views",
     "conditions": "when transfer wins",
     "toy": "the paper's toy experiment",
+    "faults": "what faults do to the robot, and what it notices",
     "tune": "search for the controllers' gains",
 }
 

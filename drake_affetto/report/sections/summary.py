@@ -34,6 +34,7 @@ def make(data: ReportData) -> Section:
         *_self_calibration_tiles(data),
         *_toy_tiles(data),
         *_tuning_tiles(data),
+        *_faults_tiles(data),
     ] or _few_tiles(data)
     columns = {1: 1, 2: 2, 4: 4, 5: 5, 7: 4, 8: 4}.get(len(tiles), 3)
     return Section(
@@ -148,6 +149,23 @@ def _toy_tiles(data: ReportData) -> list[Tile]:
             f"{toy.source.rotated_mse:.3g} before; paper: "
             f"{toy.paper.transfer.other_mse_mean:g} after",
         )
+    ]
+
+
+def _faults_tiles(data: ReportData) -> list[Tile]:
+    results = data.results("faults")
+    if results is None or len(data.folders) > 1:
+        # Beside other studies its own section is enough.
+        return []
+    faulted = f"of {wording.number(results.faulted, 'trial')} with a fault"
+    return [
+        Tile(str(results.false_success), "false successes", faulted),
+        Tile(str(results.missed), "changed unnoticed", faulted),
+        Tile(
+            str(results.sound.false_alarms),
+            "false alarms",
+            f"of {wording.number(results.sound.trials, 'trial')} without",
+        ),
     ]
 
 

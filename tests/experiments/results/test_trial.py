@@ -69,3 +69,11 @@ def test_a_result_of_other_fields_is_told(change, message):
             part[name] = value
     with pytest.raises(InputError, match=message):
         unpack("demonstration", plain, arrays, "row 3: ")
+
+
+def test_a_reason_is_stored_only_where_a_trial_is_not_valid():
+    plain, arrays = fake_world.run({"kind": "strike", **SPEC})
+    assert unpack("strike", plain, arrays).invalid == ""
+    told = plain | {"invalid": "commands come late"}
+    again, _ = pack(unpack("strike", told, arrays))
+    assert again == told
