@@ -11,7 +11,7 @@ from drake_affetto.calibration.ellipse import (
 from drake_affetto.calibration.hand import HandLook
 from drake_affetto.experiments import trials
 from drake_affetto.experiments.mirror_looks import way_to
-from drake_affetto.experiments.mirror_setup import true_knowledge
+from drake_affetto.experiments.mirror_setup import MirrorSetup
 from drake_affetto.geometry.planes import reflect
 from drake_affetto.scene.world import FramePose
 from support.fake_mirrors import plane_of
@@ -24,7 +24,7 @@ POSTURE = [0.0, 0.07, 0.12, 0.1, 0.3, 0.45, -0.2, 1.0]
 
 @pytest.fixture(scope="module")
 def robot():
-    return true_knowledge("mirror", "drumming")
+    return MirrorSetup.of("mirror", "drumming").true_knowledge()
 
 
 def hand_look(posture, seed=1):
