@@ -200,6 +200,9 @@ class PidfController(LeafSystem):
     def set_gains(self, context: Context, gains: PidfGains) -> None:
         """Changes the gains; the integral is kept where kI stays above 0.
 
+        Args:
+            gains: Gains of all joints.
+
         Raises:
             InputError: for the gains of another number of joints.
         """

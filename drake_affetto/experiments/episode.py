@@ -226,7 +226,11 @@ class TrialRunner:
         return self._taps
 
     def spectrogram(self, recording: Recording) -> Array:
-        """(bands, frames) of a recording's sound."""
+        """(bands, frames) of a recording's sound.
+
+        Args:
+            recording: A trial's recording.
+        """
         return spectrogram(
             recording.sound, recording.sound_rate, self.reward_config
         )
@@ -234,11 +238,20 @@ class TrialRunner:
     def reward(
         self, recording: Recording, prototypes: Sequence[Array]
     ) -> float:
-        """R of paper Eq. 10, from the sound alone."""
+        """R of paper Eq. 10, from the sound alone.
+
+        Args:
+            recording: A trial's recording.
+            prototypes: Spectrograms (bands, frames) of sounds of the drum.
+        """
         return reward(self.spectrogram(recording), prototypes)
 
     def prototype(self, recording: Recording) -> Array:
-        """The recording's loudest moment, as a prototype for rewards."""
+        """The recording's loudest moment, as a prototype for rewards.
+
+        Args:
+            recording: A trial's recording.
+        """
         return cut_prototype(self.spectrogram(recording), self.reward_config)
 
     def gaze(
@@ -347,7 +360,11 @@ class TrialRunner:
         return self._record(start, seed)
 
     def play(self, theta: Array, start: float) -> None:
-        """Has the movement θ (n·K,) begin at the time `start`, s."""
+        """Has the movement θ (n·K,) begin at the time `start`, s.
+
+        Args:
+            theta: Policy parameters (n·K,).
+        """
         self.station.policy.set_policy_parameters(
             self._sub(self.station.policy), theta, start
         )
@@ -421,6 +438,9 @@ class TrialRunner:
 
         For judging only, by the true posture: neither learner nor reward know
         of it.
+
+        Args:
+            recording: The trial's recording.
         """
         plant = self.station.plant
         context = self._sub(plant)

@@ -31,7 +31,12 @@ class Prediction:
 def predict(
     simulator: JointSimulator, values: dict[str, float], log: RobotLog
 ) -> Prediction:
-    """Simulates `log` free-running, in closed and in open loop."""
+    """Simulates `log` free-running, in closed and in open loop.
+
+    Args:
+        simulator: Simulator of the joint.
+        values: Values by the parameter's name.
+    """
     delay = simulator.estimate_start_delay(values, log)
     return Prediction(
         log=log,

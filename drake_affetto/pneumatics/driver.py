@@ -215,6 +215,9 @@ def AddPneumaticDriver(
     the ports of their true state and chamber pressure, and returns the ports of
     both as read. `longest_delay` is the most, s, that a trial adds to a dead
     time.
+
+    Args:
+        model_instance: The model's instance in the plant.
     """
     model = plant.GetModelInstanceName(model_instance)
     config.check(model)

@@ -134,6 +134,10 @@ class JointSensors(LeafSystem):
             true_pressure: [p_a; p_b] (2n) of the chambers, Pa.
             limits: q_lower and q_upper.
             name: Name of the system.
+            parameters: Resolution, noise and filter of the sensors.
+            joint_names: Names of the n joints.
+            period: Time between two samples, s.
+            lead: Time by which a sample is taken early, s.
         """
         sensors = JointSensors(
             parameters, joint_names, *limits, period=period, lead=lead

@@ -277,6 +277,9 @@ class AffettoStation(Diagram):
     def set_mirror_pose(self, context: Context, pose: world.FramePose) -> None:
         """Puts the mirror elsewhere; the pose is that of `mirror_pose`.
 
+        Args:
+            pose: Pose of the mirror.
+
         Raises:
             InputError: for a pose that is out of range.
         """
@@ -309,6 +312,9 @@ class AffettoStation(Diagram):
 
     def set_posture(self, context: Context, q: ArrayLike) -> None:
         """Sets the active joints to q (n,), rad, at rest.
+
+        Args:
+            q: Angles of the active joints (n,), rad.
 
         Raises:
             InputError: if an angle is beyond its joint's limits.
@@ -589,5 +595,8 @@ class AffettoStation(Diagram):
         """Sets the offset (n,), Pa, that is added to u_PID (paper Eq. 8).
 
         It takes the place of the gravity that the controller compensates.
+
+        Args:
+            offset: Offset of each active joint (n,), Pa.
         """
         self._gravity.set_constant(self._sub(self._gravity, context), offset)

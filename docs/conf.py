@@ -1,0 +1,120 @@
+"""How Sphinx builds the site: `make docs`.
+
+AFFETTO_DOCS_TUTORIALS  names of the tutorials that are run, by commas (all);
+                        the others are shown without what they print
+"""
+
+import os
+from pathlib import Path
+import sys
+
+os.environ.setdefault("MPLBACKEND", "Agg")
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE / "extensions"))
+
+import gallery
+
+from drake_affetto import __version__
+
+project = "drake_affetto"
+author = "The drake_affetto developers"
+copyright = "The drake_affetto developers; BSD 3-Clause"
+version = release = __version__
+
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_gallery.gen_gallery",
+    "myst_parser",
+    "api_pages",
+    "command_help",
+    "field_tables",
+    "mathml",
+    "parameter_tables",
+    "pydrake_system",
+]
+exclude_patterns = ["extensions", "static", "templates", "rooms.dot"]
+exclude_patterns += ["**/GALLERY_HEADER.rst", "sg_execution_times.rst"]
+default_role = "py:obj"
+
+# --- The pages' look ---------------------------------------------------------
+
+html_theme = "furo"
+html_title = f"drake_affetto {release}"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_js_files = ["site.js"]
+templates_path = ["templates"]
+html_copy_source = False
+html_show_sphinx = False
+html_math_renderer = "mathml"
+pygments_style = "a11y-high-contrast-light"
+pygments_dark_style = "a11y-high-contrast-dark"
+html_theme_options = {
+    "navigation_with_keys": True,
+    "light_css_variables": {"color-brand-content": "#0b5ea8"},
+}
+
+# --- Texts -------------------------------------------------------------------
+
+myst_enable_extensions = ["dollarmath", "deflist", "colon_fence"]
+myst_heading_anchors = 3
+math_number_all = False
+
+# --- API ---------------------------------------------------------------------
+
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+python_use_unqualified_type_names = True
+toc_object_entries_show_parents = "hide"
+
+# --- Tutorials, which are run ------------------------------------------------
+
+_out = HERE.parent / "out/docs-work"
+_scripts = _out / "tutorials"
+_only = os.environ.get("AFFETTO_DOCS_TUTORIALS")
+gallery.prepare(_scripts)
+
+# A tutorial is run again if it, or the package, has changed.
+_stamp = _out / "content"
+_content = gallery.content_of_package()
+_changed = not _stamp.is_file() or _stamp.read_text() != _content
+
+sphinx_gallery_conf = {
+    "examples_dirs": str(_scripts),
+    "gallery_dirs": "tutorials",
+    "filename_pattern": gallery.pattern(_only),
+    "ignore_pattern": r"__init__\.py",
+    "run_stale_examples": _changed,
+    "abort_on_example_error": True,
+    "reset_argv": "gallery.reset_argv",
+    "copyfile_regex": r".*\.yaml$",
+    "image_scrapers": ("matplotlib", gallery.SavedFigures(_out / "tutorials")),
+    "first_notebook_cell": gallery.FIRST_CELL.format(arguments="[]"),
+    "capture_repr": (),
+    "remove_config_comments": True,
+    "download_all_examples": False,
+    "show_signature": False,
+    "write_computation_times": False,
+    "show_memory": False,
+    "min_reported_time": 1,
+    "nested_sections": True,
+}
+suppress_warnings = ["config.cache"]
+
+
+def _remember(app, error):
+    """Notes for which package the tutorials were run, once all were."""
+    if error is None:
+        _stamp.parent.mkdir(parents=True, exist_ok=True)
+        _stamp.write_text(_content)
+
+
+def setup(app):
+    """Connects what is not worth an extension."""
+    app.connect("build-finished", _remember)
