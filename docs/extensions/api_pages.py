@@ -7,6 +7,7 @@ gives a table of the names and then an entry for each. What has no text, see
 """
 
 from collections.abc import Iterator
+import dataclasses
 import importlib
 import inspect
 from pathlib import Path
@@ -164,7 +165,8 @@ def complete_docstring(
 
     Runs before napoleon, on the Google style.
     """
-    if what not in ("method", "function"):
+    fit = what in ("method", "function", "class")
+    if not fit or dataclasses.is_dataclass(obj):
         return
     if "".join(lines).strip() == docstring_check.OF_BASE:
         lines[:] = base_docstring(obj).splitlines()

@@ -135,8 +135,10 @@ def missing_of_class(cls: type) -> list[str]:
     """
     told: dict[str, str] = {}
     prose: set[str] = set()
+    # Those of Drake, scikit-learn and so on are told there.
+    own = cls.__module__.partition(".")[0]
     for each in reversed(cls.__mro__):
-        if each.__module__.startswith("drake_affetto"):
+        if each.__module__.partition(".")[0] == own:
             told |= entries(inspect.cleandoc(each.__doc__ or ""))
             init = each.__dict__.get("__init__")
             told |= entries(
@@ -156,12 +158,13 @@ def missing_of_class(cls: type) -> list[str]:
         wanted = parameters(cls)
     else:
         wanted = []
+    common = set() if dataclasses.is_dataclass(cls) else set(COMMON)
     # Classes made by a template take what its own docstring says.
     template = wanted == ["args", "kwargs"]
     return [
         name
         for name in wanted
-        if not (template or name in _KNOWN | set(COMMON))
+        if not (template or name in _KNOWN | common)
         and not told.get(name)
         and name not in prose
     ]

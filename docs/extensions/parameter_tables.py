@@ -88,8 +88,10 @@ def _marks(value: Value, head: str) -> tuple[str, ...]:
     if not said:
         # "valve_lag [step] 11 to 18 ms, regulator_gain [step]; underlap [est]"
         name = re.escape(value.path[-1])
-        told = re.search(rf"\b{name}\b([^;.]*)", head)
-        said = _MARK.findall(told[1]) if told else []
+        told = re.search(rf"\b{name}\b(:?)([^;.]*)", head)
+        said = _MARK.findall(told[2]) if told else []
+        if told and not told[1]:
+            del said[1:]  # of the names that follow
     if not said:
         said = re.findall(r"Without a mark: \[(\w+)\]", head)
     return tuple(dict.fromkeys(mark for mark in said if mark in EVIDENCE))
@@ -102,13 +104,22 @@ def _values(
         for key, value in node.value:
             yield from _values(value, (*path, key.value), lines, head)
         return
-    first, last = node.start_mark, node.end_mark
+    first, last = node.start_mark, _end(node)
     text = (
         node.value
         if isinstance(node, yaml.ScalarNode)
         else _flat(lines, first, last)
     )
     yield Value(path, text, _comment(lines, first.line, last, head))
+
+
+def _end(node: yaml.Node) -> yaml.Mark:
+    """Where a value ends; that of a list in lines is that of its last item."""
+    if isinstance(node, yaml.SequenceNode) and not node.flow_style:
+        return _end(node.value[-1])
+    if isinstance(node, yaml.MappingNode) and not node.flow_style:
+        return _end(node.value[-1][1])
+    return node.end_mark
 
 
 def _flat(lines: Sequence[str], first: yaml.Mark, last: yaml.Mark) -> str:

@@ -97,10 +97,11 @@ def untold_ports(docstring: str, other: Any = None) -> list[str]:
     missing = []
     for found in _BLOCK.finditer(docstring):
         block = read_block(found[2])
-        text = docstring
+        text = _BLOCK.sub("", docstring)
         elsewhere = _ELSEWHERE.search(docstring)
         if elsewhere and other is not None:
-            text += inspect.cleandoc(other(elsewhere[1]) or "") + "\n"
+            told_there = inspect.cleandoc(other(elsewhere[1]) or "") + "\n"
+            text += _BLOCK.sub("", told_there)
         heads = " ".join(_items(text.replace("``", "`")))
         told = set(re.findall(r"[\w.]+", heads))
         for port in (*block.input_ports, *block.output_ports):

@@ -96,7 +96,7 @@ class PidfController(LeafSystem):
             gains: gains of the n joints.
             period: of the updates, s.
             integral_limit: greatest part of u from the integral, Pa.
-            difference_limit: greatest |u|, Pa.
+            difference_limit: greatest magnitude of u, Pa.
             integral_deadband: error that is not integrated, rad.
 
         Raises:

@@ -61,7 +61,7 @@ _REMEMBERED_GRIDS = 16
 
 
 class Rollout(NamedTuple):
-    """A movement: time `t` (N,), `q`, `q_dot` and `q_ddot` (N, n), rad and s."""
+    """A movement: `t` (N,), `q`, `q_dot` and `q_ddot` (N, n), s and rad."""
 
     t: Array
     q: Array

@@ -23,6 +23,7 @@ class Mirror:
     """A planar mirror: pose X_WM (4, 4), z its normal, and its size [m].
 
     Attributes:
+        X_WM: Pose in the world (4, 4).
         width: Width of the glass, m.
         height: Height of the glass, m.
     """

@@ -110,6 +110,7 @@ class AffettoStation(Diagram):
       same time (see `joint_state`).
     - affetto.estimated_state (2n): the same as the robot's sensors have it.
     - affetto.valve_opening (n): v⁺ in [-1, 1].
+    - affetto.pressure_command (2n): set-points [p_a; p_b], Pa absolute.
     - affetto.pid_output (n): u_PID, Pa.
     - affetto.actuation (n): N m.
     - affetto.chamber_pressure (2n): [p_a; p_b] as read, Pa absolute.
