@@ -70,7 +70,7 @@ bench: setup
 
 clean:
 	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
-	rm -rf .hypothesis .coverage docs/tutorials
+	rm -rf .hypothesis .coverage docs/tutorials docs/api/rooms
 	find . -path './.*' -prune -o -name __pycache__ -type d \
 	    -exec rm -rf {} +
 

@@ -12,9 +12,11 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "extensions"))
 
+import api_pages
 import gallery
 
 from drake_affetto import __version__
+from drake_affetto.cli.main import COMMANDS
 
 project = "drake_affetto"
 author = "The drake_affetto developers"
@@ -34,6 +36,10 @@ extensions = [
     "pydrake_system",
 ]
 exclude_patterns = ["extensions", "static", "templates", "rooms.dot"]
+# A how-to of a command stays out where the package does not have it.
+exclude_patterns += [
+    f"howto/{name}.md" for name in ("faults",) if name not in COMMANDS
+]
 exclude_patterns += ["**/GALLERY_HEADER.rst", "sg_execution_times.rst"]
 default_role = "py:obj"
 
@@ -62,6 +68,8 @@ myst_heading_anchors = 3
 math_number_all = False
 
 # --- API ---------------------------------------------------------------------
+
+api_pages.write_pages(HERE / "api/rooms")
 
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
@@ -106,7 +114,7 @@ sphinx_gallery_conf = {
     "min_reported_time": 1,
     "nested_sections": True,
 }
-suppress_warnings = ["config.cache"]
+suppress_warnings = ["config.cache", "toc.excluded"]
 
 
 def _remember(app, error):

@@ -46,6 +46,25 @@ def rooms() -> list[str]:
     )
 
 
+def write_pages(folder: Path) -> None:
+    """Writes a page for each room; those of rooms that have gone go.
+
+    Args:
+        folder: Where to; what is right already stays as it is.
+    """
+    folder.mkdir(exist_ok=True)
+    wanted = {}
+    for room in rooms():
+        name = f"drake_affetto.{room}"
+        text = f"{name}\n{'=' * len(name)}\n\n.. face:: {name}\n"
+        wanted[folder / f"{room}.rst"] = text
+    for path in set(folder.glob("*.rst")) - set(wanted):
+        path.unlink()
+    for path, text in wanted.items():
+        if not path.is_file() or path.read_text() != text:
+            path.write_text(text)
+
+
 def first_sentence(docstring: str) -> str:
     """What a docstring says first, in one line."""
     head = inspect.cleandoc(docstring).partition("\n\n")[0]

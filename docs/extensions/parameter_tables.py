@@ -93,7 +93,7 @@ def _marks(value: Value, head: str) -> tuple[str, ...]:
         if told and not told[1]:
             del said[1:]  # of the names that follow
     if not said:
-        said = re.findall(r"Without a mark: \[(\w+)\]", head)
+        said = re.findall(r"Without a\s+mark: \[(\w+)\]", head)
     return tuple(dict.fromkeys(mark for mark in said if mark in EVIDENCE))
 
 

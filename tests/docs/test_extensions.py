@@ -317,4 +317,4 @@ def test_every_command_has_a_how_to():
         for line in path.read_text().splitlines():
             if line.startswith("```{command-help}"):
                 told.add(line.split()[-1])
-    assert told == set(COMMANDS)
+    assert set(COMMANDS) <= told

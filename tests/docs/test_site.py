@@ -26,7 +26,7 @@ MAIN = (
     "howto/drum.html",
     "physics/pneumatics.html",
     "tutorials/pneumatic_arm.html",
-    "api/motion.html",
+    "api/rooms/motion.html",
     "protocol.html",
 )
 
@@ -134,12 +134,12 @@ def test_blocks_stand_left_to_right_and_stack_on_a_phone(browser, built):
         " return [b.left, b.top]; })"
     )
     browser.set_size(1280, 800)
-    browser.open(built / "api/perception.html")
+    browser.open(built / "api/rooms/perception.html")
     left = [x for x, _ in browser.evaluate(places)]
     assert left == sorted(left)
     assert left[0] < left[1] < left[2]
     browser.set_size(360, 780, True)
-    browser.open(built / "api/perception.html")
+    browser.open(built / "api/rooms/perception.html")
     top = [y for _, y in browser.evaluate(places)]
     assert top[0] < top[1] < top[2]
 

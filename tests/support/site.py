@@ -16,7 +16,7 @@ def copy_sources(folder: Path) -> Path:
     shutil.copytree(
         ROOT / "docs",
         folder / "docs",
-        ignore=shutil.ignore_patterns("tutorials", "__pycache__"),
+        ignore=shutil.ignore_patterns("tutorials", "rooms", "__pycache__"),
     )
     for name in ("drake_affetto", "models"):
         (folder / name).symlink_to(ROOT / name)
