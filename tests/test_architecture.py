@@ -383,6 +383,9 @@ TESTED_IN = {
     "cli/serve": "robot/test_server.py",
     "cli/tune": "tuning/test_study.py",
     "envs/scene_picture": "envs/test_drum.py",
+    "experiments/calibration_media": (
+        "experiments/test_self_calibration_study.py"
+    ),
     "experiments/media": "experiments/test_demo.py",
     "experiments/results": "experiments/results/test_study.py",
     "identification/plots": "identification/test_study.py",

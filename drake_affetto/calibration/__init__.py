@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         PlanePrior,
     )
     from drake_affetto.calibration.postures import HandCalibration
+    from drake_affetto.calibration.recheck import HandRecheck
     from drake_affetto.calibration.watch import StrokeWatch
 
 __getattr__, __dir__, __all__ = attach(
@@ -35,6 +36,7 @@ __getattr__, __dir__, __all__ = attach(
         "EllipseLook": "ellipse",
         "HandCalibration": "postures",
         "HandLook": "hand",
+        "HandRecheck": "recheck",
         "KnowledgeErrors": "knowledge",
         "PlaneBelief": "belief",
         "PlaneEstimate": "plane",

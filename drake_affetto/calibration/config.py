@@ -147,7 +147,12 @@ class WatchConfig:
         strange_when_right: Share of drums that are seen where none can stand,
             while it is right.
         strange_when_wrong: The same while it is wrong.
-        threshold: Sum of log likelihood ratios at which it is noticed.
+        threshold: Sum of log likelihood ratios at which it is noticed by
+            strokes alone.
+        suspicion: Sum at which the robot looks at its hand again, to see.
+        recheck_looks: Number of such looks of which the majority decides.
+        recheck_limit: Distance from where the hand should show, beyond which
+            a look speaks against the belief, px.
     """
 
     hit_when_right: float = number(0.95, 0.5, 0.9999)
@@ -155,6 +160,9 @@ class WatchConfig:
     strange_when_right: float = number(0.02, 1e-6, 0.5)
     strange_when_wrong: float = number(0.3, 1e-6, 0.99)
     threshold: float = number(5.0, 0.1, 100.0)
+    suspicion: float = number(1.5, 0.1, 100.0)
+    recheck_looks: int = number(3, 1, 99)
+    recheck_limit: float = number(8.0, 0.1, 1000.0)
 
     def check(self, where: str) -> None:
         """Raises InputError naming the first field that does not fit."""
@@ -170,6 +178,12 @@ class WatchConfig:
             self.strange_when_right,
             0.0,
             self.strange_when_wrong,
+        )
+        require(
+            self.recheck_looks % 2 == 1,
+            f"{where}.recheck_looks",
+            self.recheck_looks,
+            "an odd number: the majority decides",
         )
 
 

@@ -294,3 +294,13 @@ class HandCalibration:
         if isinstance(self._outcome, CalibrationFailure):
             raise self._outcome
         return self._outcome
+
+    def agreeing(self) -> list[HandLook]:
+        """The looks that show the hand where the estimate has it.
+
+        Raises:
+            CalibrationFailure: If the looks do not determine the plane.
+        """
+        seen = [look for look in self.looks if look.pixel is not None]
+        used = self.estimate().used
+        return [look for look, good in zip(seen, used, strict=True) if good]

@@ -13,8 +13,18 @@ class StrokeWatch:
     zero. Once it reaches the threshold, the belief is taken to be wrong.
     """
 
-    def __init__(self, config: WatchConfig) -> None:
+    def __init__(
+        self, config: WatchConfig, threshold: float | None = None
+    ) -> None:
+        """Begins at zero.
+
+        Args:
+            config: How often strokes are heard.
+            threshold: Sum at which the belief is taken to be wrong; None for
+                the configuration's.
+        """
         self._config = config
+        self._threshold = config.threshold if threshold is None else threshold
         self.sum = 0.0
 
     def see(self, plausible: bool) -> bool:
@@ -45,7 +55,7 @@ class StrokeWatch:
 
     def _step(self, log_ratio: float) -> bool:
         self.sum = max(0.0, self.sum + log_ratio)
-        return self.sum >= self._config.threshold
+        return self.sum >= self._threshold
 
     def reset(self) -> None:
         """Begins anew, after a calibration."""

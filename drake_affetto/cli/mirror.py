@@ -6,16 +6,23 @@ from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Any
 
-from drake_affetto.cli.options import make_plan
+from drake_affetto.cli.options import make_plan, real_number
 from drake_affetto.cli.study_command import Call, StudyCommand, rate_text
 from drake_affetto.common.errors import require
+from drake_affetto.common.fields import option_name
 from drake_affetto.experiments.plans import MirrorPlan, SelfCalibrationPlan
 
 if TYPE_CHECKING:
     from drake_affetto.experiments.mirror import MirrorOutcome
     from drake_affetto.experiments.results import MirrorResults
+    from drake_affetto.experiments.self_calibration_study import (
+        SelfCalibrationOutcome,
+    )
 
 Outcomes = dict[str, "MirrorOutcome"]
+
+# Options that say which mirrors the robot finds by itself.
+_OF_MIRRORS = ("rotation", "translation")
 
 
 def _views(plan: MirrorPlan, args: argparse.Namespace) -> list[str]:
@@ -52,6 +59,14 @@ class MirrorCommand(StudyCommand[MirrorPlan]):
             action="store_true",
             help="the robot finds mirrors by itself, without a demonstration",
         )
+        for field in dataclasses.fields(SelfCalibrationPlan):
+            if field.name in _OF_MIRRORS:
+                parser.add_argument(
+                    option_name(field),
+                    type=real_number,
+                    metavar="X",
+                    help=f"{field.metadata['help']} ({field.default:g})",
+                )
         parser.add_argument(
             "--calibration",
             metavar="FILE",
@@ -90,7 +105,15 @@ class MirrorCommand(StudyCommand[MirrorPlan]):
                 "one changed view, without --all-scenarios",
             )
             load_self_calibration(args.calibration)
+            _self_calibration_plan(self.make_plan(args), args).check()
             _require_mirror(args.scenario or MirrorPlan.scenario)
+        for name in _OF_MIRRORS:
+            require(
+                args.self_calibrate or vars(args)[name] is None,
+                f"--{name}",
+                vars(args)[name],
+                "nothing without --self-calibrate",
+            )
         try:
             return super().run(args)
         except CalibrationFailure as failure:
@@ -124,7 +147,10 @@ class MirrorCommand(StudyCommand[MirrorPlan]):
         """Records a trial of each view; gathers the results."""
         plan = call.plan
         if call.args.self_calibrate:
-            return found
+            if not call.args.no_media and found.repeat is not None:
+                call.console.print("Recording the looks and a strike ...")
+                _record_calibration(call.out, found, call.args.calibration)
+            return found.results
         if call.args.all_scenarios:
             from drake_affetto.experiments.results import ScenariosResults
 
@@ -150,29 +176,49 @@ def _require_mirror(scenario: str) -> None:
     )
 
 
-def _self_calibrate(call: Call[MirrorPlan]) -> "MirrorResults":
+def _self_calibration_plan(
+    plan: MirrorPlan, args: argparse.Namespace
+) -> SelfCalibrationPlan:
+    """The plan that the options describe; its own defaults elsewhere."""
+    shared = {
+        name: value
+        for name, value in vars(plan).items()
+        if name in SelfCalibrationPlan.__dataclass_fields__
+        and value != getattr(MirrorPlan, name)
+    }
+    asked = {
+        name: vars(args)[name]
+        for name in _OF_MIRRORS
+        if vars(args)[name] is not None
+    }
+    return SelfCalibrationPlan(settings=args.calibration, **shared, **asked)
+
+
+def _self_calibrate(call: Call[MirrorPlan]) -> "SelfCalibrationOutcome":
     """Has the robot find mirrors by itself; prints how well."""
     from drake_affetto.experiments.self_calibration_study import (
         run_self_calibration,
     )
 
-    plan = call.plan
-    results = run_self_calibration(
-        call.executor,
-        SelfCalibrationPlan(
-            scenario=plan.scenario,
-            samples=plan.samples,
-            repeats=plan.repeats,
-            evaluations=plan.evaluations,
-            demonstrations=plan.demonstrations,
-            settings=call.args.calibration,
-            direct=plan.direct,
-            seed=plan.seed,
-        ),
+    plan = _self_calibration_plan(call.plan, call.args)
+    outcome = run_self_calibration(call.executor, plan, call.out)
+    _print(outcome.results, call.console)
+    _print_methods(outcome.results, call.console)
+    return outcome
+
+
+def _record_calibration(
+    out: Path, found: "SelfCalibrationOutcome", settings: str
+) -> None:
+    """Writes the replay of the first repeat that found its mirror."""
+    from drake_affetto.experiments.calibration_media import (
+        write_calibration_replay,
     )
-    _print(results, call.console)
-    _print_methods(results, call.console)
-    return results
+
+    assert found.repeat is not None
+    assert found.by_hand is not None
+    seed = found.results.seed
+    write_calibration_replay(out, settings, found.repeat, found.by_hand, seed)
 
 
 def _print_methods(results: "MirrorResults", console: Any) -> None:

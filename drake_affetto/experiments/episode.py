@@ -68,6 +68,8 @@ class Recording:
         contact_force: Force on the head, N, and distance of the contact from
             its center, m (T, 2).
         knock_force: Forces on the shell and on the table (T, 2), N.
+        hiss_flow: Root of the sum of squares of the air flows through all
+            valves (T,), kg/s: as loud as their jets are together.
         joint_t: Times of the joints (S,), s.
         joint_state: Angles and speeds (S, 2n) as the robot's sensors have
             them, rad, rad/s.
@@ -82,6 +84,7 @@ class Recording:
     t: Array
     contact_force: Array
     knock_force: Array
+    hiss_flow: Array
     joint_t: Array
     joint_state: Array
     true_state: Array
@@ -296,6 +299,7 @@ class TrialRunner:
         seed: int,
         attempt: int = 0,
         variability: float = 1.0,
+        aim: Array | None = None,
     ) -> GuidedMovement:
         """Guides the arm to the drum at xy and back, as a simulated teacher.
 
@@ -304,13 +308,16 @@ class TrialRunner:
             seed: Seed of the teacher's and the robot's variation.
             attempt: Number of earlier attempts at this position.
             variability: Factor of the teacher's variation.
+            aim: Where the palm is to touch (3,), m in the world; None for the
+                middle of the drum's head.
         """
         teaching = self.scenario.teaching.varied(variability)
         station = self.station
         grasped = self._soften(xy, seed)
+        touched = station.touching_position(self.context)
         stroke = draw_stroke(
             teaching,
-            station.touching_position(self.context),
+            touched if aim is None else np.asarray(aim, float),
             np.random.default_rng([seed, 0x7EAC4]),
             attempt,
         )
@@ -561,6 +568,7 @@ class TrialRunner:
             t=t,
             contact_force=contact,
             knock_force=knock,
+            hiss_flow=np.linalg.norm(flow, axis=1),
             joint_t=joint_t - start,
             joint_state=state,
             true_state=self._log("affetto.joint_state")[1],

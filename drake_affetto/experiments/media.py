@@ -4,8 +4,10 @@ The trials shown are run here once more, in this process and with Meshcat
 recording them; they are the same simulations that the results come from.
 """
 
+from collections.abc import Callable, Sequence
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import cv2
 import matplotlib
@@ -66,42 +68,25 @@ def write_media(
         prototypes: Prototypes of the reward in the figure's title.
         seed: Seed of the noise.
     """
-    meshcat = Meshcat(MeshcatParams(host="localhost"))
-    set_default_camera_pose(meshcat)
-    meshcat.StartRecording(
-        frames_per_second=_FRAMES_PER_SECOND,
-        set_visualizations_while_recording=False,
-    )
-    begin = 0.0
-    shown = []
-    for trial in (direct, mirror):
-        trials = TrialRunner(
-            trial.scenario,
-            meshcat,
-            MeshcatVisualizerParams(
-                prefix=trial.name,
-                publish_period=1.0 / _FRAMES_PER_SECOND,
-            ),
-            start_time=begin,
-        )
-        gaze, recording = trials.drum(np.asarray(trial.xy), trial.skill, seed)
-        end = trials.context.get_time()
-        shown.append((trial, trials, gaze, recording, begin, end))
-        begin = float(np.ceil(end + _PAUSE))
-    for trial, _, _, _, first, last in shown:
-        path = f"/drake/{trial.name}"
-        meshcat.SetProperty(path, "visible", first == 0.0, 0.0)
-        meshcat.SetProperty(path, "visible", True, first)
-        if trial is not mirror:
-            meshcat.SetProperty(path, "visible", False, last + 0.9 * _PAUSE)
-    meshcat.StopRecording()
-    meshcat.PublishRecording()
-    write_bytes_atomic(out / "replay.html", meshcat.StaticHtml().encode())
 
-    for trial, trials, gaze, _, _, _ in shown:
+    def act(
+        trial: ShownTrial,
+    ) -> Callable[[TrialRunner], tuple[GazeOutcome, Recording | None]]:
+        return lambda trials: trials.drum(
+            np.asarray(trial.xy), trial.skill, seed
+        )
+
+    both = direct, mirror
+    scenes = [Scene(each.name, each.scenario, act(each)) for each in both]
+    recorded = record_replay(out / "replay.html", scenes)
+    shown = [
+        (trial, trials, *outcome)
+        for trial, (trials, outcome) in zip(both, recorded, strict=True)
+    ]
+    for trial, trials, gaze, _ in shown:
         if gaze.found and trials.gaze(np.asarray(trial.xy), seed).found:
             draw_view(out / f"camera_{trial.name}.png", trials)
-    _, trials, gaze, hit, _, _ = shown[0]
+    _, trials, gaze, hit = shown[0]
     if hit is None:
         return
     _write_sound(out / "hit.wav", hit)
@@ -118,6 +103,66 @@ def write_media(
         hit,
         trials.reward(hit, prototypes),
     )
+
+
+@dataclasses.dataclass
+class Scene:
+    """A part of a replay.
+
+    Attributes:
+        name: Name of the part in the replay's scene tree.
+        scenario: Scenario of the part.
+        act: What happens in it; returns what came of it.
+    """
+
+    name: str
+    scenario: Scenario
+    act: Callable[[TrialRunner], Any]
+
+
+def record_replay(
+    path: Path, scenes: Sequence[Scene]
+) -> list[tuple[TrialRunner, Any]]:
+    """Runs scenes one after another and writes them as a 3D replay.
+
+    Args:
+        path: File of the replay, a web page.
+        scenes: What is shown, in order.
+
+    Returns:
+        The runner of each scene, and what came of it.
+    """
+    meshcat = Meshcat(MeshcatParams(host="localhost"))
+    set_default_camera_pose(meshcat)
+    meshcat.StartRecording(
+        frames_per_second=_FRAMES_PER_SECOND,
+        set_visualizations_while_recording=False,
+    )
+    begin = 0.0
+    shown = []
+    for scene in scenes:
+        trials = TrialRunner(
+            scene.scenario,
+            meshcat,
+            MeshcatVisualizerParams(
+                prefix=scene.name,
+                publish_period=1.0 / _FRAMES_PER_SECOND,
+            ),
+            start_time=begin,
+        )
+        outcome = scene.act(trials)
+        end = trials.context.get_time()
+        tree = f"/drake/{scene.name}"
+        meshcat.SetProperty(tree, "visible", begin == 0.0, 0.0)
+        meshcat.SetProperty(tree, "visible", True, begin)
+        if scene is not scenes[-1]:
+            meshcat.SetProperty(tree, "visible", False, end + 0.9 * _PAUSE)
+        shown.append((trials, outcome))
+        begin = float(np.ceil(end + _PAUSE))
+    meshcat.StopRecording()
+    meshcat.PublishRecording()
+    write_bytes_atomic(path, meshcat.StaticHtml().encode())
+    return shown
 
 
 def _write_sound(path: Path, recording: Recording) -> None:

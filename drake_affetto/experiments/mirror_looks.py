@@ -19,8 +19,9 @@ from drake_affetto.perception.blob import Blob, BlobConfig, detect
 # When the arm has come to the posture of a look, and when it leaves it, as
 # parts of a movement.
 _ARRIVE, _LEAVE = 0.42, 0.72
-# Images are taken at these parts of a movement, once the arm is at rest.
-_IMAGES = (0.62, 0.66, 0.70)
+IMAGES = (0.62, 0.66, 0.70)
+"""Images are taken at these parts of a movement, once the arm is at rest."""
+
 # Points of the way to a posture and back.
 _POINTS = 121
 
@@ -60,14 +61,22 @@ def look_at_hand(
     Returns:
         The mean reading and pixel of some images of the arm at rest.
     """
+    trials.settle(xy, seed)
+    return look_from_here(trials, posture, blob)
+
+
+def look_from_here(
+    trials: TrialRunner, posture: Array, blob: BlobConfig
+) -> HandLookResult:
+    """The same from the start posture, in a simulation that goes on."""
     duration = trials.scenario.dmp.duration
     theta = trials.dmp.encode(
         *way_to(trials.station.start_posture, posture, duration)
     )
-    start = trials.settle(xy, seed) + trials.scenario.policy.delay
+    start = trials.context.get_time() + trials.scenario.policy.delay
     trials.play(theta, start)
     readings, blobs = [], []
-    for part in _IMAGES:
+    for part in IMAGES:
         trials.advance(start + part * duration)
         state = trials.port("affetto.estimated_state")
         readings.append(state[: trials.station.num_joints])

@@ -21,7 +21,9 @@ class Plan:
         check_ranges(self)
 
 
-def _repeat_for_bodies(plan: "DrumPlan | MirrorPlan") -> None:
+def _repeat_for_bodies(
+    plan: "DrumPlan | MirrorPlan | SelfCalibrationPlan",
+) -> None:
     # What is no number is told by `check`.
     if isinstance(plan.bodies, int) and plan.bodies > 0:
         object.__setattr__(plan, "repeats", plan.bodies)
@@ -176,10 +178,13 @@ class SelfCalibrationPlan(Plan):
         repeats: Number of times that all of it is done, each with a mirror,
             a robot that knows itself badly in its own way, and positions of
             its own.
+        bodies: Number of robots of other bodies, each with a repeat and a
+            skill of its own: they take the place of `repeats`. 0: one robot.
         evaluations: Number of unseen positions of a repeat.
         demonstrations: Number of demonstrations in direct view, from which
             the skill is learned.
-        skills: Number of skills that are learned; repeats share them.
+        skills: Number of skills that are learned; repeats of one body share
+            them.
         schemes: Schemes that are compared with demonstrations.
         rotation: Greatest turn of the mirror about x and z, degrees.
         translation: Greatest shift of the mirror along each axis, m.
@@ -187,6 +192,7 @@ class SelfCalibrationPlan(Plan):
             that does not is set up anew.
         turned_by: Angle by which the mirror is turned in between, degrees.
         turned_after: Number of strokes after which it is.
+        quiet: Number of strokes before these, in which it stays too.
         settings: YAML file of the self-calibration.
         direct: Scenario in which the skill is learned.
         seed: Seed of everything that is random.
@@ -195,18 +201,28 @@ class SelfCalibrationPlan(Plan):
     scenario: str = "mirror"
     samples: tuple[int, ...] = number((3, 4, 5), 2, 100)
     repeats: int = number(10, 1, 1000)
+    bodies: int = number(0, 0, 1000)
     evaluations: int = number(8, 1, 1000)
     demonstrations: int = number(25, 3, 1000)
     skills: int = number(2, 1, 1000)
     schemes: tuple[str, ...] = ("relearn", "transfer_default")
-    rotation: float = number(5.0, 0.0, 30.0)
-    translation: float = number(0.03, 0.0, 0.3)
+    rotation: float = number(
+        8.0, 0.0, 30.0, "greatest turn of its mirrors about x and z, degrees"
+    )
+    translation: float = number(
+        0.05, 0.0, 0.3, "greatest shift of its mirrors along each axis, m"
+    )
     least_seen: float = number(0.95, 0.0, 1.0)
     turned_by: float = number(5.0, -45.0, 45.0)
     turned_after: int = number(10, 1, 1000)
+    quiet: int = number(20, 0, 1000)
     settings: str = "package://drake_affetto/self_calibration.yaml"
     direct: str = "drumming"
     seed: int = number(0, 0, GREATEST_SEED)
+
+    def __post_init__(self) -> None:
+        """Each body has a repeat of its own."""
+        _repeat_for_bodies(self)
 
     @property
     def pool_size(self) -> int:

@@ -27,8 +27,9 @@ from drake_affetto.calibration.knowledge import RobotKnowledge
 from drake_affetto.calibration.plane import CalibrationFailure, PlaneEstimate
 from drake_affetto.calibration.postures import HandCalibration
 from drake_affetto.common.typing import Array
+from drake_affetto.experiments.bodies import Robots
 from drake_affetto.experiments.drumming import HIDDEN, SOURCE
-from drake_affetto.experiments.mirror_setup import draw_mirror, true_knowledge
+from drake_affetto.experiments.mirror_setup import MirrorSetup
 from drake_affetto.experiments.plans import SelfCalibrationPlan
 from drake_affetto.experiments.results import (
     EllipseLookResult,
@@ -57,7 +58,7 @@ from drake_affetto.scene.world import FramePose
 from drake_affetto.station.scenario import load_scenario
 
 # What the seeds of this study are for; the skill's are those of the drum study.
-_MIRROR, _ERRORS, _TESTS, _TRIALS, _HAND, _PLACES, _EAR = range(200, 207)
+_MIRROR, _ERRORS, _TESTS, _TRIALS, _HAND, _PLACES, _EAR, _TURN = range(200, 208)
 
 # Planes in a picture of what is believed.
 PICTURED = 40
@@ -69,7 +70,9 @@ class Repeat:
 
     Attributes:
         number: Number of the repeat.
+        scenario: Scenario of its view with the mirror.
         mirror: The true mirror; for trials and judges only.
+        turned: The same, turned by somebody in between.
         known: The robot's model of itself, which is a little wrong.
         skill: Skill, learned in direct view.
         prototypes: Prototypes of the reward (N, bands, frames).
@@ -77,11 +80,30 @@ class Repeat:
     """
 
     number: int
+    scenario: str
     mirror: FramePose
+    turned: FramePose
     known: RobotKnowledge
     skill: Any
     prototypes: np.ndarray
     positions: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class Drum:
+    """A drum before a mirror, in one trial.
+
+    Attributes:
+        repeat: Repeat to which it belongs.
+        mirror: Where the mirror is then.
+        xy: Position of the drum (2,), m.
+        seed: Seed of the trial.
+    """
+
+    repeat: Repeat
+    mirror: FramePose
+    xy: Any
+    seed: int
 
 
 @dataclasses.dataclass
@@ -97,6 +119,7 @@ class Calibrated:
         strokes: Number of own strokes.
         failure: What was missing.
         steps: Planes that were believed after so many looks or strokes.
+        seen: Looks at the hand that agree on the plane.
     """
 
     plane: PlaneEstimate | None
@@ -106,6 +129,7 @@ class Calibrated:
     strokes: int = 0
     failure: str | None = None
     steps: list[tuple[int, Array]] = dataclasses.field(default_factory=list)
+    seen: list[HandLook] = dataclasses.field(default_factory=list)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,23 +150,34 @@ class MirroredSkill:
 
 
 class SelfCalibration:
-    """The trials and the robot's decisions of one study."""
+    """The trials and the robot's decisions in some repeats of a study."""
 
     def __init__(
-        self, executor: TrialExecutor, plan: SelfCalibrationPlan
+        self,
+        executor: TrialExecutor,
+        plan: SelfCalibrationPlan,
+        numbers: Sequence[int] | None = None,
+        robots: Robots | None = None,
     ) -> None:
         """Reads the settings.
+
+        Args:
+            executor: Executor of the study.
+            plan: What the study does.
+            numbers: Numbers of the repeats; None for all.
+            robots: Robots of the repeats; None for the model's throughout.
 
         Raises:
             InputError: If the plan or a file does not fit.
         """
         plan.check()
         self.executor, self.plan = executor, plan
+        self.numbers = range(plan.repeats) if numbers is None else numbers
+        self.robots = Robots() if robots is None else robots
         self.settings: SelfCalibrationConfig = load_self_calibration(
             plan.settings
         )
         self.scenario = load_scenario(plan.scenario)
-        self.truth = true_knowledge(plan.scenario, plan.direct)
         self.repeats: list[Repeat] = []
 
     # Setting up
@@ -150,37 +185,74 @@ class SelfCalibration:
     def set_up(self) -> None:
         """Teaches the skills in direct view and sets up the mirrors."""
         plan = self.plan
-        taught = []
-        for number in range(min(plan.skills, plan.repeats)):
-            demonstrations = teach_positions(
-                self.executor,
-                f"Kinesthetic teaching, {number + 1} of "
-                f"{min(plan.skills, plan.repeats)}",
-                plan.direct,
-                plan.demonstrations,
-                (plan.seed, SOURCE, number),
-            )
-            skill = learn_skill(
-                load_scenario(plan.direct).skill,
-                demonstrations,
-                trial_seed(plan.seed, HIDDEN, number),
-            )
-            taught.append((skill, stack_prototypes(demonstrations)))
-        for number in range(plan.repeats):
-            skill, prototypes = taught[number % len(taught)]
-            errors = self.settings.knowledge.draw(
-                len(self.truth.joints), self.rng(_ERRORS, number)
-            )
+        own_bodies = bool(self.robots.bodies)
+        # Robots of one body share skills and views.
+        taught: dict[int, tuple[Any, np.ndarray]] = {}
+        setups: dict[int, MirrorSetup] = {}
+        for number in self.numbers:
+            skill = number if own_bodies else number % plan.skills
+            body = number if own_bodies else 0
+            if skill not in taught:
+                taught[skill] = self._teach(skill)
+            if body not in setups:
+                # Only the last is needed again.
+                setups = {body: self._setup(number)}
             self.repeats.append(
-                Repeat(
-                    number=number,
-                    mirror=draw_mirror(plan, self.rng(_MIRROR, number)),
-                    known=self.truth.corrected(errors),
-                    skill=skill,
-                    prototypes=prototypes,
-                    positions=self.positions(plan.evaluations, _TESTS, number),
-                )
+                self._repeat(number, setups[body], *taught[skill])
             )
+
+    def _setup(self, number: int) -> MirrorSetup:
+        plan, robots = self.plan, self.robots
+        return MirrorSetup.of(
+            robots.scenario(number, plan.scenario),
+            robots.scenario(number, plan.direct),
+        )
+
+    def _teach(self, number: int) -> tuple[Any, np.ndarray]:
+        """A skill that is learned in direct view, and its prototypes."""
+        plan = self.plan
+        direct = self.robots.scenario(number, plan.direct)
+        demonstrations = teach_positions(
+            self.executor,
+            f"Kinesthetic teaching, skill {number + 1}",
+            direct,
+            plan.demonstrations,
+            (plan.seed, SOURCE, number),
+        )
+        skill = learn_skill(
+            load_scenario(direct).skill,
+            demonstrations,
+            trial_seed(plan.seed, HIDDEN, number),
+        )
+        return skill, stack_prototypes(demonstrations)
+
+    def _repeat(
+        self,
+        number: int,
+        setup: MirrorSetup,
+        skill: Any,
+        prototypes: np.ndarray,
+    ) -> Repeat:
+        """One mirror, and the robot before it."""
+        plan, truth = self.plan, setup.true_knowledge()
+        mirror = setup.draw_mirror(plan, self.rng(_MIRROR, number))
+        errors = self.settings.knowledge.draw(
+            len(truth.joints), self.rng(_ERRORS, number)
+        )
+        return Repeat(
+            number=number,
+            scenario=self.robots.scenario(number, plan.scenario),
+            mirror=mirror,
+            turned=setup.turned(plan, mirror, self.rng(_TURN, number)),
+            known=truth.corrected(errors),
+            skill=skill,
+            prototypes=prototypes,
+            positions=self.positions(plan.evaluations, _TESTS, number),
+        )
+
+    def repeat(self, number: int) -> Repeat:
+        """The repeat of this number."""
+        return self.repeats[self.numbers.index(number)]
 
     def rng(self, *numbers: int) -> np.random.Generator:
         """A source of randomness that belongs to these numbers alone."""
@@ -196,37 +268,74 @@ class SelfCalibration:
 
     def title(self, what: str) -> str:
         """Name of a phase of the study."""
-        return f"{what}, {self.plan.scenario}"
+        among = ""
+        if len(self.numbers) < self.plan.repeats:
+            among = f", repeats {self.numbers[0] + 1}-{self.numbers[-1] + 1}"
+        return f"{what}, {self.plan.scenario}{among}"
 
     # Trials
 
     def look_at(
-        self, label: str, drums: Mapping[Any, tuple[FramePose, Any, int]]
+        self, label: str, drums: Mapping[Any, Drum]
     ) -> dict[Any, GazeResult]:
-        """Has the gaze search for drums: mirror, position and seed of each."""
+        """Has the gaze search for drums."""
         return run_trials(
             self.executor,
             self.title(label),
             {
-                key: at_mirror(look(self.plan.scenario, xy, seed), mirror)
-                for key, (mirror, xy, seed) in drums.items()
+                key: at_mirror(
+                    look(drum.repeat.scenario, drum.xy, drum.seed), drum.mirror
+                )
+                for key, drum in drums.items()
             },
         )
 
-    def strike_spec(
+    def look_at_hands(
         self,
-        repeat: Repeat,
-        mirror: FramePose,
-        xy: Any,
-        seed: int,
-        gaze: GazeResult,
-        mover: Any,
+        label: str,
+        looks: Mapping[int, tuple[FramePose, int, Array]],
+    ) -> dict[int, HandLook]:
+        """Has robots look at their hands in mirrors.
+
+        Args:
+            label: Name of this phase.
+            looks: Mirror, seed and posture (n,), by repeat.
+        """
+        blob, aside = self.settings.hand.blob, self.settings.hand.aside
+        found: dict[int, HandLookResult] = run_trials(
+            self.executor,
+            self.title(label),
+            {
+                i: at_mirror(
+                    hand_look(
+                        self.repeat(i).scenario, aside, seed, posture, blob
+                    ),
+                    mirror,
+                )
+                for i, (mirror, seed, posture) in looks.items()
+            },
+        )
+        return {
+            i: HandLook(
+                np.array(seen.readings),
+                None if seen.pixel is None else np.array(seen.pixel),
+            )
+            for i, seen in found.items()
+        }
+
+    def strike_spec(
+        self, drum: Drum, gaze: GazeResult, mover: Any
     ) -> Spec | None:
         """The spec of a strike; None where the drum was not found."""
         spec = strike_if_seen(
-            self.plan.scenario, xy, seed, gaze, mover, repeat.prototypes
+            drum.repeat.scenario,
+            drum.xy,
+            drum.seed,
+            gaze,
+            mover,
+            drum.repeat.prototypes,
         )
-        return None if spec is None else at_mirror(spec, mirror)
+        return None if spec is None else at_mirror(spec, drum.mirror)
 
     def strike(
         self, label: str, tests: Mapping[Any, Spec | None]
@@ -252,7 +361,7 @@ class SelfCalibration:
         for i in mirrors:
             try:
                 sessions[i] = HandCalibration(
-                    self.repeats[i].known,
+                    self.repeat(i).known,
                     settings.knowledge,
                     settings.prior,
                     settings.hand,
@@ -264,30 +373,23 @@ class SelfCalibration:
             going = [i for i, session in sessions.items() if not session.done]
             if not going:
                 break
-            looks: dict[int, HandLookResult] = run_trials(
-                self.executor,
-                self.title(f"Looking at the hand, {number + 1}"),
+            looks = self.look_at_hands(
+                f"Looking at the hand{', again' * use}, {number + 1}",
                 {
-                    i: at_mirror(
-                        hand_look(
-                            self.plan.scenario,
-                            settings.hand.aside,
-                            self.seed(_HAND, i, use, number),
-                            sessions[i].next_posture(),
-                            settings.hand.blob,
-                        ),
+                    i: (
                         mirrors[i],
+                        self.seed(_HAND, i, use, number),
+                        sessions[i].next_posture(),
                     )
                     for i in going
                 },
             )
             for i, seen in looks.items():
-                pixel = None if seen.pixel is None else np.array(seen.pixel)
-                sessions[i].add(HandLook(np.array(seen.readings), pixel))
+                sessions[i].add(seen)
                 if i == 0:
                     steps[i] += _step(sessions[i])
         return {
-            i: self._from_hand(self.repeats[i], sessions.get(i), failed, steps)
+            i: self._from_hand(self.repeat(i), sessions.get(i), failed, steps)
             for i in mirrors
         }
 
@@ -315,6 +417,7 @@ class SelfCalibration:
             optical_transform(estimate.knowledge, estimate.plane),
             looks,
             steps=steps[repeat.number],
+            seen=session.agreeing(),
         )
 
     def by_ellipse(self) -> dict[int, Calibrated]:
@@ -332,7 +435,7 @@ class SelfCalibration:
             {
                 (each.number, k): at_mirror(
                     ellipse_look(
-                        self.plan.scenario,
+                        each.scenario,
                         xy,
                         self.seed(_PLACES, each.number, k),
                     ),

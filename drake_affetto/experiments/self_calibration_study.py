@@ -5,15 +5,20 @@ demonstrations before the same mirror, at the same positions.
 """
 
 from collections.abc import Mapping, Sequence
+import dataclasses
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from drake_affetto.calibration.plane import CalibrationFailure
 from drake_affetto.common.typing import Array
-from drake_affetto.experiments.mirror_setup import (
-    judge_plane,
-    pose_matrix,
+from drake_affetto.experiments.bodies import Robots, draw_robots
+from drake_affetto.experiments.mirror_setup import judge_plane, pose_matrix
+from drake_affetto.experiments.mirror_watch import (
+    Watched,
+    watch,
+    watch_result,
 )
 from drake_affetto.experiments.plans import SelfCalibrationPlan
 from drake_affetto.experiments.results import (
@@ -29,6 +34,7 @@ from drake_affetto.experiments.results.self_calibration import (
 )
 from drake_affetto.experiments.self_calibration import (
     Calibrated,
+    Drum,
     MirroredSkill,
     Repeat,
     SelfCalibration,
@@ -44,7 +50,6 @@ from drake_affetto.experiments.stroke_courses import (
     Strokes,
     listen,
     strokes_result,
-    watch,
 )
 from drake_affetto.experiments.trials import (
     at_mirror,
@@ -55,33 +60,152 @@ from drake_affetto.geometry.planes import normals, plane_parameters
 from drake_affetto.runner.executor import TrialExecutor
 
 _TEST, _SAMPLES = range(300, 302)
+_BODIES = 307
+
+# Repeats of own bodies that run side by side: workers keep so many stations.
+_TOGETHER = 5
 
 # Half the length of a mirror's line in a picture, m.
 _REACH = 0.3
 
 
+@dataclasses.dataclass
+class _Group:
+    """Repeats that run side by side, and what they came to.
+
+    Attributes:
+        study: The repeats.
+        methods: Calibration of each repeat by each method.
+        by_ear: Strokes by ear, from several beliefs.
+        tests: Strokes of everyone at the unseen positions.
+        watched: Strokes while mirrors are turned, by repeat.
+    """
+
+    study: SelfCalibration
+    methods: dict[str, dict[int, Calibrated]]
+    by_ear: list[Strokes] = dataclasses.field(default_factory=list)
+    tests: dict[Any, StrikeResult | None] = dataclasses.field(
+        default_factory=dict
+    )
+    watched: dict[int, Watched] = dataclasses.field(default_factory=dict)
+
+
+@dataclasses.dataclass(frozen=True)
+class SelfCalibrationOutcome:
+    """Results of the study, and what it takes to show one repeat.
+
+    Attributes:
+        results: Content of results.json.
+        repeat: First repeat that found its mirror by the hand; None if the
+            hand found none.
+        by_hand: What the hand came to there.
+    """
+
+    results: MirrorResults
+    repeat: Repeat | None
+    by_hand: Calibrated | None
+
+
 def run_self_calibration(
-    executor: TrialExecutor, plan: SelfCalibrationPlan
-) -> MirrorResults:
+    executor: TrialExecutor,
+    plan: SelfCalibrationPlan,
+    folder: Path | None = None,
+) -> SelfCalibrationOutcome:
     """Runs the study; see the module.
+
+    Args:
+        executor: Executor of the study.
+        plan: What the study does.
+        folder: Folder of the results; only bodies need it.
 
     Raises:
         InputError: If the plan or a file does not fit.
         CalibrationFailure: If the robot finds no mirror in any repeat, by its
             hand or by the drum's marker; the message says what is missing.
     """
-    study = SelfCalibration(executor, plan)
+    plan.check()
+    robots = draw_robots(
+        plan.bodies, plan.scenario, (plan.seed, _BODIES), folder
+    )
+    # A station of each body stays in memory while its repeats run.
+    size = _TOGETHER if plan.bodies else plan.repeats
+    groups = [
+        _calibrate(
+            SelfCalibration(
+                executor,
+                plan,
+                range(first, min(first + size, plan.repeats)),
+                robots,
+            )
+        )
+        for first in range(0, plan.repeats, size)
+    ]
+    for name in ("hand", "ellipse"):
+        _require_some([group.methods[name] for group in groups])
+    for group in groups:
+        _drum(group)
+    shown = next(
+        (
+            (each, found)
+            for group in groups
+            for each in group.study.repeats
+            if (found := group.methods["hand"][each.number]).plane is not None
+        ),
+        (None, None),
+    )
+    return SelfCalibrationOutcome(_results(plan, groups, robots), *shown)
+
+
+def _calibrate(study: SelfCalibration) -> _Group:
+    """Has robots look for their mirrors."""
     study.set_up()
     mirrors = {each.number: each.mirror for each in study.repeats}
     hand = study.by_hand(mirrors)
-    _require_some(hand)
-    ellipse = study.by_ellipse()
-    _require_some(ellipse)
-    by_ear = listen(study, ellipse)
-    heard = _from_ear(study, by_ear[-1])
-    methods = {"hand": hand, "ellipse": ellipse, "ear": heard}
-    pools = _demonstrate(study)
-    tests = _test(study, methods, pools)
+    return _Group(study, {"hand": hand, "ellipse": study.by_ellipse()})
+
+
+def _require_some(found: Sequence[Mapping[int, Calibrated]]) -> None:
+    """Raises CalibrationFailure if no repeat found its mirror."""
+    calibrated = [each for group in found for each in group.values()]
+    failures = [each.failure for each in calibrated if each.failure]
+    if len(failures) == len(calibrated):
+        raise CalibrationFailure(failures[0])
+
+
+def _drum(group: _Group) -> None:
+    """Has robots strike by ear, at unseen positions, and watched."""
+    study, methods = group.study, group.methods
+    group.by_ear = listen(study, methods["ellipse"])
+    methods["ear"] = _from_ear(study, group.by_ear[-1])
+    group.tests = _test(study, methods, _demonstrate(study))
+    group.watched = watch(study, methods["hand"])
+
+
+def _results(
+    plan: SelfCalibrationPlan, groups: Sequence[_Group], robots: Robots
+) -> MirrorResults:
+    """The results of all groups together."""
+    tests = {key: test for group in groups for key, test in group.tests.items()}
+    repeats = [each for group in groups for each in group.study.repeats]
+    by_ear = [
+        Strokes.joined(parts)
+        for parts in zip(*(group.by_ear for group in groups), strict=True)
+    ]
+    methods = {
+        name: _method(
+            plan,
+            name,
+            [
+                (each, group.methods[name][each.number])
+                for group in groups
+                for each in group.study.repeats
+            ],
+            tests,
+            by_ear[-1],
+        )
+        for name in groups[0].methods
+    }
+    watched = {i: one for group in groups for i, one in group.watched.items()}
     return MirrorResults.of(
         plan,
         choice="first",
@@ -89,34 +213,25 @@ def run_self_calibration(
         workspace=1.0,
         schemes={
             name: {
-                count: scheme_cell(_table(study, tests, (name, count)))
+                count: scheme_cell(_table(plan, tests, (name, count)))
                 for count in plan.samples
             }
             for name in plan.schemes
         },
         comparisons=[],
+        bodies=robots.numbers(),
         self_calibration=SelfCalibrationResults(
             repeats=plan.repeats,
             evaluations=plan.evaluations,
             rotation=plan.rotation,
             translation=plan.translation,
-            methods={
-                name: _method(study, name, found, tests, by_ear)
-                for name, found in methods.items()
-            },
+            methods=methods,
             by_ear=[strokes_result(each) for each in by_ear],
-            watch=watch(study, hand),
-            beliefs=_beliefs(study, methods),
-            true_line=list(_line(*_true_plane(study.repeats[0]))),
+            watch=watch_result(plan, watched) if watched else None,
+            beliefs=_beliefs(repeats[0], groups[0].methods),
+            true_line=list(_line(*_true_plane(repeats[0]))),
         ),
     )
-
-
-def _require_some(found: Mapping[int, Calibrated]) -> None:
-    """Raises CalibrationFailure if no repeat found its mirror."""
-    failures = [each.failure for each in found.values() if each.failure]
-    if len(failures) == len(found):
-        raise CalibrationFailure(failures[0])
 
 
 def _from_ear(
@@ -128,7 +243,7 @@ def _from_ear(
             strokes.beliefs[each.number].estimate,
             each.known,
             belief_transform(strokes.beliefs[each.number]),
-            strokes=strokes.heard.shape[1],
+            strokes=len(strokes.heard[each.number]),
             steps=strokes.steps if each.number == 0 else [],
         )
         for each in study.repeats
@@ -150,7 +265,7 @@ def _demonstrate(
         {
             (each.number, k): at_mirror(
                 demonstration(
-                    plan.scenario, xy, study.seed(_SAMPLES, each.number, k)
+                    each.scenario, xy, study.seed(_SAMPLES, each.number, k)
                 ),
                 each.mirror,
             )
@@ -205,10 +320,8 @@ def _test(
     """Everyone's strokes at the unseen positions of all repeats."""
     plan = study.plan
     drums = {
-        (each.number, k): (
-            each.mirror,
-            xy,
-            study.seed(_TEST, each.number, k),
+        (each.number, k): Drum(
+            each, each.mirror, xy, study.seed(_TEST, each.number, k)
         )
         for each in study.repeats
         for k, xy in enumerate(each.positions)
@@ -230,33 +343,32 @@ def _test(
             key = each.number, k
             for name, mover in movers.items():
                 tests[name, *key] = study.strike_spec(
-                    each, *drums[key], gazes[key], mover
+                    drums[key], gazes[key], mover
                 )
     return study.strike("Drumming", tests)
 
 
 def _table(
-    study: SelfCalibration, tests: Mapping[Any, StrikeResult | None], name: Any
+    plan: SelfCalibrationPlan,
+    tests: Mapping[Any, StrikeResult | None],
+    name: Any,
 ) -> list[list[StrikeResult | None]]:
     """Strikes of a method: a row a repeat, a column a position."""
     return [
-        [
-            tests.get((name, each.number, k))
-            for k in range(study.plan.evaluations)
-        ]
-        for each in study.repeats
+        [tests.get((name, number, k)) for k in range(plan.evaluations)]
+        for number in range(plan.repeats)
     ]
 
 
 def _method(
-    study: SelfCalibration,
+    plan: SelfCalibrationPlan,
     name: str,
-    found: Mapping[int, Calibrated],
+    found: Sequence[tuple[Repeat, Calibrated]],
     tests: Mapping[Any, StrikeResult | None],
-    by_ear: Sequence[Strokes],
+    by_ear: Strokes,
 ) -> MethodResult:
-    cell = scheme_cell(_table(study, tests, name))
-    rows = [_plane_row(each, found[each.number]) for each in study.repeats]
+    cell = scheme_cell(_table(plan, tests, name))
+    rows = [_plane_row(*each) for each in found]
     covered = [row.covered for row in rows if row.covered is not None]
     return MethodResult(
         success_rate=cell.success_rate,
@@ -267,7 +379,9 @@ def _method(
         offset_error=_median([row.offset_error for row in rows]),
         coverage=success_rate([covered]) if covered else None,
         planes=rows,
-        heard=by_ear[-1].heard.tolist() if name == "ear" else [],
+        heard=[
+            each.tolist() for each in by_ear.heard.values() if name == "ear"
+        ],
     )
 
 
@@ -304,9 +418,8 @@ def _plane_row(repeat: Repeat, found: Calibrated) -> PlaneRow:
 
 
 def _beliefs(
-    study: SelfCalibration, methods: Mapping[str, Mapping[int, Calibrated]]
+    repeat: Repeat, methods: Mapping[str, Mapping[int, Calibrated]]
 ) -> list[BeliefStep]:
-    repeat = study.repeats[0]
     reference = repeat.known.eye_position
     height = repeat.known.marker_height
     return [
@@ -316,7 +429,7 @@ def _beliefs(
             lines=[_line(plane, reference, height) for plane in planes],
         )
         for name, found in methods.items()
-        for step, planes in found[0].steps
+        for step, planes in found[repeat.number].steps
     ]
 
 

@@ -41,6 +41,8 @@ class FitState:
         stage: Number of finished stages.
         cost: Mean squared weighted error of the last stage.
         profile: Ratios of errors by parameter, see `profile_fit`.
+        members: Values of the fits without one log, by that log's name, see
+            `fit_members`.
     """
 
     values: dict[str, float]
@@ -48,6 +50,9 @@ class FitState:
     stage: int = 0
     cost: float = math.inf
     profile: dict[str, list[float]] = dataclasses.field(default_factory=dict)
+    members: dict[str, dict[str, float]] = dataclasses.field(
+        default_factory=dict
+    )
 
 
 # What each stage of a fit simulates; its step of finite differences; its

@@ -5,6 +5,7 @@ from pathlib import Path
 from drake_affetto.common.output import (
     atomic_path,
 )
+from drake_affetto.identification.bands import LEVEL
 from drake_affetto.identification.prediction import Prediction
 
 
@@ -36,6 +37,22 @@ def draw_prediction(path: Path, prediction: Prediction) -> None:
             top.plot(log.t, log.q_des, "0.7", label="reference")
         top.plot(log.t, log.q, "k", label="measured")
         top.plot(simulated.t, simulated.q, "C3", label="simulated")
+        band = prediction.bands.get(kind.removesuffix("_loop"))
+        if band is not None:
+            for axis, channel, color in (
+                (top, 0, "C3"),
+                (bottom, 1, "C0"),
+                (bottom, 2, "C1"),
+            ):
+                axis.fill_between(
+                    log.t,
+                    band.lower[:, channel],
+                    band.upper[:, channel],
+                    color=color,
+                    alpha=0.2,
+                    lw=0,
+                    label=f"{LEVEL:.0%} band" if axis is top else None,
+                )
         for measured, model, color, name in (
             (log.p_a, simulated.p_a, "C0", "a"),
             (log.p_b, simulated.p_b, "C1", "b"),

@@ -13,6 +13,7 @@ from drake_affetto.common.output import (
     write_text_atomic,
 )
 from drake_affetto.common.typing import Array
+from drake_affetto.identification.bands import LEVEL, Band
 from drake_affetto.identification.fit import FitState
 from drake_affetto.identification.prediction import Prediction
 from drake_affetto.identification.problem import JointProblem
@@ -23,6 +24,7 @@ from drake_affetto.identification.simulator import (
 from drake_affetto.identification.uncertainty import (
     Uncertainty,
 )
+from drake_affetto.robot.log import RobotLog
 
 
 def _rms(predictions: Sequence[Prediction], kind: str) -> Array:
@@ -36,12 +38,38 @@ def _named(rms: Array) -> dict[str, float]:
     return {name: float(x) for name, x in zip(names, rms, strict=True)}
 
 
+def _by_channel(values: Array) -> dict[str, float]:
+    return {
+        name: float(x)
+        for name, x in zip(("q", "pa", "pb"), values, strict=True)
+    }
+
+
+def _bands(predictions: Sequence[Prediction]) -> dict[str, Any]:
+    """Coverage of the bands over several logs, by loop and channel."""
+    loops = predictions[0].bands if predictions else {}
+    return {
+        loop: _by_channel(
+            np.mean([p.bands[loop].coverage(p.log) for p in predictions], 0)
+        )
+        for loop in loops
+    }
+
+
 def _per_log(predictions: Sequence[Prediction]) -> dict[str, Any]:
     return {
         p.log.name: {
             "start_delay_s": p.start_delay,
             "closed_loop": _named(p.closed_loop.rms(p.log)),
             "open_loop": _named(p.open_loop.rms(p.log)),
+            "open_loop_percent_per_kpa": p.drift_per_kpa,
+            "bands": {
+                loop: {
+                    "coverage": _by_channel(band.coverage(p.log)),
+                    "half_width": _by_channel(band.half_width(p.log)),
+                }
+                for loop, band in p.bands.items()
+            },
         }
         for p in predictions
     }
@@ -93,6 +121,8 @@ def make_results(
         "open_loop": _named(_rms(tested, "open_loop")),
         "fit_closed_loop": _named(_rms(fitted, "closed_loop")),
         "fit_open_loop": _named(_rms(fitted, "open_loop")),
+        # Of the logs that were held out; none where the fit had one log.
+        "bands": {"level": LEVEL, "coverage": _bands(tested)},
         "logs": {**_per_log(fitted), **_per_log(tested)},
         "parameters": parameters,
         "undetermined": [
@@ -115,6 +145,14 @@ def write_csv(path: Path, simulated: Simulated) -> None:
         [simulated.t, simulated.q, simulated.p_a, simulated.p_b], axis=1
     )
     lines = ["t,q,pa,pb"]
+    lines += [",".join(f"{x:.6g}" for x in row) for row in rows]
+    write_text_atomic(path, "\n".join(lines) + "\n")
+
+
+def write_band(path: Path, log: RobotLog, band: Band) -> None:
+    """Writes a prediction interval: time, and both ends of each channel."""
+    rows = np.column_stack([log.t, band.lower, band.upper])
+    lines = ["t,q_low,pa_low,pb_low,q_high,pa_high,pb_high"]
     lines += [",".join(f"{x:.6g}" for x in row) for row in rows]
     write_text_atomic(path, "\n".join(lines) + "\n")
 

@@ -11,6 +11,7 @@ from drake_affetto.common.fingerprint import files_digest
 from drake_affetto.common.folder_lock import lock_folder
 from drake_affetto.common.output import write_json, write_text_atomic
 from drake_affetto.common.typed_json import from_plain
+from drake_affetto.identification.bands import calibrate_bands, fit_members
 from drake_affetto.identification.fit import FIT_STAGES, FitState, fit_logs
 from drake_affetto.identification.plots import draw_prediction
 from drake_affetto.identification.prediction import predict
@@ -18,6 +19,7 @@ from drake_affetto.identification.problem import JointProblem
 from drake_affetto.identification.results import (
     actuator_yaml,
     make_results,
+    write_band,
     write_csv,
 )
 from drake_affetto.identification.simulator import ANGLE_SCALE, JointSimulator
@@ -83,10 +85,11 @@ def _fit(
         TimeElapsedColumn,
     )
 
-    total = len(FIT_STAGES) + len(PROFILED)
+    refits = len(logs) if len(logs) > 1 else 0
+    total = len(FIT_STAGES) + len(PROFILED) + refits
     key = fit_key(problem, paths)
     state = read_state(folder / _STATE_FILE, key)
-    done = 0 if state is None else state.stage + len(state.profile)
+    done = 0 if state is None else _stages_done(state)
     if state is not None:
         console.print(
             f"found {done} of {total} stages done in {folder}, going on from "
@@ -120,6 +123,13 @@ def _fit(
             note=f"squared error x {ratio:.2f}",
         )
 
+    def on_member(name: str, cost: float) -> None:
+        progress.update(
+            task,
+            description=f"fitting without {name}",
+            note=f"error {ANGLE_SCALE * cost**0.5:.2f} % of range",
+        )
+
     def on_stage(reached: FitState) -> None:
         nonlocal lowest
         lowest = float("inf")
@@ -127,7 +137,7 @@ def _fit(
             folder / _STATE_FILE,
             {"key": key, "state": dataclasses.asdict(reached)},
         )
-        progress.update(task, completed=reached.stage + len(reached.profile))
+        progress.update(task, completed=_stages_done(reached))
 
     with progress:
         state = fit_logs(
@@ -137,6 +147,13 @@ def _fit(
             on_evaluation=on_evaluation,
             on_stage=on_stage,
         )
+        state = fit_members(
+            problem,
+            logs,
+            state,
+            on_evaluation=on_member,
+            on_member=on_stage,
+        )
         return profile_fit(
             problem,
             logs,
@@ -144,6 +161,10 @@ def _fit(
             on_evaluation=on_profile,
             on_parameter=on_stage,
         )
+
+
+def _stages_done(state: FitState) -> int:
+    return state.stage + len(state.members) + len(state.profile)
 
 
 def run_identification(
@@ -176,14 +197,19 @@ def run_identification(
         state = _fit(problem, fit, paths, folder, console)
         uncertainty = estimate_uncertainty(problem, fit, state)
         simulator = JointSimulator(problem)
-        tested = [predict(simulator, state.values, log) for log in test]
-        fitted = [predict(simulator, state.values, log) for log in fit]
+        scales = calibrate_bands(simulator, fit, state)
+        tested = [predict(simulator, state, log, scales) for log in test]
+        fitted = [predict(simulator, state, log, scales) for log in fit]
         results = make_results(problem, state, uncertainty, fitted, tested)
         # The files.
         for prediction in tested:
             stem = prediction.log.name
             write_csv(folder / f"{stem}_closed.csv", prediction.closed_loop)
             write_csv(folder / f"{stem}_open.csv", prediction.open_loop)
+            for loop, band in prediction.bands.items():
+                write_band(
+                    folder / f"{stem}_{loop}_band.csv", prediction.log, band
+                )
         for prediction in (*fitted, *tested):
             draw_prediction(folder / f"{prediction.log.name}.png", prediction)
         write_text_atomic(

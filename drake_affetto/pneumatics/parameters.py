@@ -119,7 +119,7 @@ class PneumaticParameters:
         joints: the actuator of each joint by the joint's name.
     """
 
-    supply_pressure: float = 659.3e3
+    supply_pressure: float = 701.3e3
     atmospheric_pressure: float = 101.3e3
     temperature: float = 293.15
     polytropic_exponent: float = 1.2

@@ -147,6 +147,10 @@ def _title(data: ReportData) -> str:
         return "Affetto learns to drum"
     if data.comparison or data.comparisons:
         return "A drumming skill, seen otherwise"
+    if data.results("self_calibration"):
+        return "Affetto finds the mirror by itself"
+    if data.results("bodies") or data.results("drum_bodies"):
+        return "Other bodies, the same skill"
     if data.results("tune") and not data.results("toy"):
         return "Gains of the controllers, tuned on the whole robot"
     return "Transfer of a skill to inputs it has never seen"
@@ -154,7 +158,12 @@ def _title(data: ReportData) -> str:
 
 def _story(data: ReportData) -> str:
     """The paragraph that summarizes it all."""
-    parts = [*_robot_story(data), *_drumming_story(data), *_mirror_story(data)]
+    parts = [
+        *_robot_story(data),
+        *_drumming_story(data),
+        *_mirror_story(data),
+        *_self_calibration_story(data),
+    ]
     toy = data.results("toy")
     if toy and not parts:
         parts.append(wording.toy_gain(toy) + ".")
@@ -169,7 +178,7 @@ def _story(data: ReportData) -> str:
 
 
 def _robot_story(data: ReportData) -> list[str]:
-    if not (data.drumming or data.comparison or data.comparisons):
+    if set(data.folders) <= {"toy", "tune", "conditions"}:
         return []
     return [
         "Affetto is a child robot whose joints are moved by air. Here it is "
@@ -216,3 +225,21 @@ def _mirror_story(data: ReportData) -> list[str]:
             [wording.in_text(k) for k in conclusion.level]
         )
     return [text + "."]
+
+
+def _self_calibration_story(data: ReportData) -> list[str]:
+    results = data.results("self_calibration")
+    if results is None:
+        return []
+    methods = results.self_calibration.methods
+    ways = wording.joined(
+        [
+            f"by {wording.METHODS.get(name, name)} "
+            f"({wording.percent(method.success_rate.mean)})"
+            for name, method in methods.items()
+        ]
+    )
+    return [
+        "Where the mirror stands, the robot finds out without a "
+        f"demonstration, {ways}."
+    ]

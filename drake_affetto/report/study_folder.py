@@ -26,6 +26,7 @@ _BODIES = {"mirror": "bodies", "drum": "drum_bodies"}
 # What a study's folder can hold beside its numbers, and what kind it is of.
 MEDIA = {
     "replay.html": "text/html",
+    "self_calibration.html": "text/html",
     "camera_direct.png": "image/png",
     "camera_mirror.png": "image/png",
     "trial.png": "image/png",
@@ -42,7 +43,7 @@ class StudyFolder:
     Attributes:
         folder: The folder.
         study: Kind of study, one of `STUDIES`, or "bodies" and "drum_bodies"
-            for those with a body a repeat.
+            for those with a body a repeat, or "self_calibration".
         results: Content of its results.json.
         media: Its pictures, sounds and replay, by file name.
     """
@@ -82,8 +83,10 @@ def read_folder(folder: Path) -> StudyFolder:
             f"{path} was made by version {version[:40]}, this is {__version__}:"
             f" run the study again, or `affetto report` of that version"
         )
-    if getattr(found, "bodies", None):
-        # It stands on the page beside the study of one robot.
+    # They stand on the page beside the study of one robot.
+    if getattr(found, "self_calibration", None):
+        study = "self_calibration"
+    elif getattr(found, "bodies", None):
         study = _BODIES[study]
     media = {name: folder / name for name in MEDIA if (folder / name).is_file()}
     return StudyFolder(folder, study, found, media)

@@ -84,6 +84,13 @@ _UNIT = "\N{NO-BREAK SPACE}%"
 # SuccessRates nearer than this are called equal.
 _EQUAL = 0.005
 
+# How the robot finds a mirror by itself.
+METHODS = {
+    "hand": "its hand in the mirror",
+    "ellipse": "the marker's ellipse",
+    "ear": "hit or miss by ear",
+}
+
 
 def scheme(name: str, full: bool = False) -> str:
     """What a scheme is called."""

@@ -8,18 +8,14 @@ import pytest
 from drake_affetto.calibration.plane import PlaneEstimate
 from drake_affetto.common.errors import InputError
 from drake_affetto.experiments.mirror_setup import (
-    draw_mirror,
+    MirrorSetup,
     judge_plane,
-    nominal_pose,
     pose_matrix,
-    seen_share,
-    true_knowledge,
-    turned,
 )
 from drake_affetto.experiments.plans import SelfCalibrationPlan
 from drake_affetto.experiments.view_maps import ViewDomain
 from drake_affetto.scene import world
-from support.fake_mirrors import plane_of
+from support.fake_mirrors import plane_of, setup, truth
 
 PLAN = SelfCalibrationPlan()
 
@@ -30,7 +26,7 @@ def view():
 
 
 def test_the_model_of_itself_is_the_plant(view):
-    known = true_knowledge("mirror", "drumming")
+    known = truth()
     station, context = view.station, view.context
     q = np.array([0.05, 0.1, 0.2, 0.1, 0.5, 0.4, -0.3, 1.2])
     station.set_posture(context, q)
@@ -48,13 +44,13 @@ def test_the_model_of_itself_is_the_plant(view):
 
 def test_a_view_without_a_mirror_is_told():
     with pytest.raises(InputError, match="drumming has no mirror"):
-        true_knowledge("drumming", "drumming")
+        MirrorSetup.of("drumming", "drumming")
     with pytest.raises(InputError, match="does not look at the drum directly"):
-        true_knowledge("mirror", "mirror")
+        MirrorSetup.of("mirror", "mirror")
 
 
 def test_the_mirror_can_be_put_elsewhere(view):
-    pose = nominal_pose("mirror")
+    pose = setup().nominal_pose()
     known = view.sight.mirrors[0].X_WM
     np.testing.assert_allclose(pose_matrix(pose), known, atol=1e-9)
     other = world.FramePose([0.33, 0.31, 0.18], [99.0, 0.0, -14.0])
@@ -74,10 +70,12 @@ def test_the_mirror_can_be_put_elsewhere(view):
 
 
 def test_mirrors_show_the_region_and_differ():
-    drawn = [draw_mirror(PLAN, np.random.default_rng(i)) for i in range(5)]
-    nominal = nominal_pose("mirror")
+    drawn = [
+        setup().draw_mirror(PLAN, np.random.default_rng(i)) for i in range(5)
+    ]
+    nominal = setup().nominal_pose()
     for pose in drawn:
-        assert seen_share("mirror", pose) >= PLAN.least_seen
+        assert setup().seen_share(pose) >= PLAN.least_seen
         off = np.subtract(pose.translation, nominal.translation)
         assert np.abs(off).max() <= PLAN.translation
         turn = np.subtract(pose.rotation, nominal.rotation)
@@ -88,16 +86,16 @@ def test_mirrors_show_the_region_and_differ():
 def test_a_mirror_out_of_view_is_told():
     plan = dataclasses.replace(PLAN, least_seen=1.0, rotation=0.0)
     far = dataclasses.replace(plan, translation=0.0)
-    if seen_share("mirror", nominal_pose("mirror")) < 1.0:
+    if setup().seen_share(setup().nominal_pose()) < 1.0:
         with pytest.raises(InputError, match="none shows 100% of the drum's"):
-            draw_mirror(far, np.random.default_rng(0))
+            setup().draw_mirror(far, np.random.default_rng(0))
     else:
-        assert draw_mirror(far, np.random.default_rng(0))
+        assert setup().draw_mirror(far, np.random.default_rng(0))
 
 
 def test_a_mirror_is_turned_about_the_vertical():
-    pose = nominal_pose("mirror")
-    after = turned(PLAN, pose, np.random.default_rng(0))
+    pose = setup().nominal_pose()
+    after = setup().turned(PLAN, pose, np.random.default_rng(0))
     n, m = pose_matrix(pose)[:3, 2], pose_matrix(after)[:3, 2]
     assert m[2] == pytest.approx(n[2])
     azimuth = np.degrees(np.arctan2(m[1], m[0]) - np.arctan2(n[1], n[0]))
@@ -105,20 +103,20 @@ def test_a_mirror_is_turned_about_the_vertical():
 
 
 def test_a_plane_is_judged():
-    pose = nominal_pose("mirror")
-    eye = true_knowledge("mirror", "drumming").eye_position
-    truth = plane_of(dataclasses.asdict(pose))
+    pose = setup().nominal_pose()
+    eye = truth().eye_position
+    true = plane_of(dataclasses.asdict(pose))
     covariance = np.diag([0.01, 0.01, 0.003]) ** 2
-    right = judge_plane(PlaneEstimate(truth, covariance, eye), pose)
+    right = judge_plane(PlaneEstimate(true, covariance, eye), pose)
     assert right.angle == pytest.approx(0.0, abs=1e-6)
     assert right.offset == pytest.approx(0.0, abs=1e-9)
     assert right.covered
     wrong = judge_plane(
-        PlaneEstimate(truth + [0.0, 0.05, 0.0], covariance, eye), pose
+        PlaneEstimate(true + [0.0, 0.05, 0.0], covariance, eye), pose
     )
     assert wrong.angle == pytest.approx(0.05, abs=1e-6)
     assert not wrong.covered
     near = judge_plane(
-        PlaneEstimate(truth + [0.0, 0.0, 0.004], covariance, eye), pose
+        PlaneEstimate(true + [0.0, 0.0, 0.004], covariance, eye), pose
     )
     assert near.offset == pytest.approx(0.004)

@@ -14,11 +14,14 @@ from drake_affetto.calibration import (
     knowledge,
     plane,
     postures,
+    recheck,
     watch,
 )
-from drake_affetto.experiments.mirror_setup import judge_plane, nominal_pose
+from drake_affetto.experiments.bodies import draw_robots
+from drake_affetto.experiments.mirror_setup import judge_plane
 from drake_affetto.experiments.plans import SelfCalibrationPlan
 from drake_affetto.experiments.self_calibration import (
+    Drum,
     MirroredSkill,
     SelfCalibration,
     belief_transform,
@@ -26,7 +29,7 @@ from drake_affetto.experiments.self_calibration import (
 from drake_affetto.runner.executor import TrialExecutor
 from drake_affetto.runner.store import TrialStore
 from drake_affetto.scene.world import FramePose
-from support.fake_mirrors import FakeMirrors
+from support.fake_mirrors import FakeMirrors, setup
 
 PLAN = SelfCalibrationPlan(
     settings=str(Path(__file__).parent / "data/quick_self_calibration.yaml"),
@@ -36,7 +39,7 @@ PLAN = SelfCalibrationPlan(
     skills=1,
     samples=(3,),
 )
-ROOM = (belief, ellipse, hand, knowledge, plane, postures, watch)
+ROOM = (belief, ellipse, hand, knowledge, plane, postures, recheck, watch)
 
 
 def study(world, plan=PLAN):
@@ -79,7 +82,7 @@ def test_the_robots_room_has_no_place_for_a_true_mirror():
 
 def test_what_it_finds_depends_on_what_it_sees_alone():
     """The world shows one mirror; the study believes it set up others."""
-    shown = dataclasses.asdict(nominal_pose("mirror"))
+    shown = dataclasses.asdict(setup().nominal_pose())
     found = []
     for shift in (0.0, 0.02):
         plan = dataclasses.replace(PLAN, repeats=1)
@@ -130,9 +133,10 @@ def test_it_drums_by_what_it_found():
     each = made.repeats[0]
     found = made.by_ellipse()
     xy = each.positions[0]
-    gaze = made.look_at("Looking", {0: (each.mirror, xy, 5)})[0]
+    drum = Drum(each, each.mirror, xy, 5)
+    gaze = made.look_at("Looking", {0: drum})[0]
     mover = MirroredSkill(each.skill, found[0].to_direct)
-    spec = made.strike_spec(each, each.mirror, xy, 5, gaze, mover)
+    spec = made.strike_spec(drum, gaze, mover)
     struck = made.strike("Drumming", {0: spec})
     assert struck[0].success
     first = made.first_beliefs("ellipse", found)[0]
@@ -145,11 +149,10 @@ def test_it_drums_by_what_it_found():
 def test_a_lost_drum_is_not_struck():
     made = study(FakeMirrors())
     each = made.repeats[0]
-    lost = dataclasses.replace(
-        made.look_at("Looking", {0: (each.mirror, each.positions[0], 5)})[0],
-        found=False,
-    )
-    assert made.strike_spec(each, each.mirror, [0, 0], 5, lost, None) is None
+    drum = Drum(each, each.mirror, each.positions[0], 5)
+    seen = made.look_at("Looking", {0: drum})[0]
+    lost = dataclasses.replace(seen, found=False)
+    assert made.strike_spec(drum, lost, None) is None
 
 
 def test_an_unreachable_box_fails_before_any_look(tmp_path):
@@ -159,3 +162,32 @@ def test_an_unreachable_box_fails_before_any_look(tmp_path):
     made = study(FakeMirrors(), plan)
     found = made.by_hand({0: made.repeats[0].mirror})
     assert "no posture brings" in found[0].failure
+
+
+def test_bodies_have_scenarios_and_skills_of_their_own(tmp_path):
+    """Robots in one group; each is asked in its own scenario."""
+    plan = dataclasses.replace(PLAN, bodies=2)
+    robots = draw_robots(2, plan.scenario, (0,), tmp_path)
+    world = FakeMirrors()
+    store = TrialStore(":memory:")
+    with TrialExecutor(world, store, workers=0, quiet=True) as executor:
+        made = SelfCalibration(executor, plan, range(2), robots)
+        made.set_up()
+        first, second = made.repeats
+        made.look_at(
+            "Looking",
+            {
+                each.number: Drum(each, each.mirror, each.positions[0], 5)
+                for each in made.repeats
+            },
+        )
+    names = {Path(s["scenario"]["@name"]).name for s in world.specs}
+    assert names == {
+        f"{view}_{i:02d}.yaml"
+        for view in ("drumming", "mirror")
+        for i in (0, 1)
+    }
+    assert first.skill is not second.skill
+    # Its camera sits elsewhere.
+    apart = np.subtract(first.known.eye_chain.X_JT, second.known.eye_chain.X_JT)
+    assert np.abs(apart).max() > 1e-3

@@ -8,6 +8,9 @@ import pytest
 
 from drake_affetto.calibration.plane import CalibrationFailure
 from drake_affetto.common.typed_json import from_plain, to_plain
+from drake_affetto.experiments.calibration_media import (
+    write_calibration_replay,
+)
 from drake_affetto.experiments.plans import SelfCalibrationPlan
 from drake_affetto.experiments.results import MirrorResults
 from drake_affetto.experiments.self_calibration_study import (
@@ -19,12 +22,16 @@ from drake_affetto.runner.store import TrialStore
 from support.fake_mirrors import FakeMirrors
 
 
-def run(path, world, plan=PLAN):
+def run_outcome(path, world, plan=PLAN):
     with (
         TrialStore(path) as store,
         TrialExecutor(world, store, workers=0, quiet=True) as executor,
     ):
         return run_self_calibration(executor, plan)
+
+
+def run(path, world, plan=PLAN):
+    return run_outcome(path, world, plan).results
 
 
 @pytest.fixture(scope="module")
@@ -114,8 +121,17 @@ def test_a_small_study_on_the_robot(tmp_path):
         skills=1,
         samples=(3,),
         schemes=("transfer_default",),
+        turned_after=1,
+        quiet=0,
     )
-    results = run(tmp_path / "t.sqlite", run_task, plan)
-    hand = results.self_calibration.methods["hand"]
+    outcome = run_outcome(tmp_path / "t.sqlite", run_task, plan)
+    hand = outcome.results.self_calibration.methods["hand"]
     assert hand.angle_error < 2.0
     assert hand.looks <= 12
+    write_calibration_replay(
+        tmp_path, plan.settings, outcome.repeat, outcome.by_hand, plan.seed
+    )
+    page = (tmp_path / "self_calibration.html").read_text()
+    # Both parts of the replay are in it.
+    for part in ("looking", "drumming"):
+        assert f"/drake/{part}" in page

@@ -1,18 +1,14 @@
-"""Strokes one after another: by ear, and watched."""
+"""Strokes by ear, one after another."""
 
-import dataclasses
-
-from experiments.test_self_calibration import PLAN, study
+from experiments.test_self_calibration import study
 import numpy as np
 import pytest
 
-from drake_affetto.experiments.self_calibration import Calibrated
 from drake_affetto.experiments.stroke_courses import (
     LATE,
     listen,
     sounded,
     strokes_result,
-    watch,
 )
 from support.fake_mirrors import FakeMirrors
 
@@ -49,33 +45,6 @@ def test_by_ear_it_comes_to_hit(made, ellipse):
     # The belief shrinks.
     first, last = (courses["prior"].steps[i][1] for i in (0, -1))
     assert np.std(last[:, 0]) < 0.5 * np.std(first[:, 0])
-
-
-def test_a_turned_mirror_is_noticed_and_found_again(made):
-    mirrors = {each.number: each.mirror for each in made.repeats}
-    result = watch(made, made.by_hand(mirrors))
-    assert result.noticed.mean == 1.0
-    assert all(3 <= delay <= 6 for delay in result.delays)
-    assert result.false_alarms == 0
-    assert result.quiet_strokes == 2 * PLAN.turned_after
-    assert result.recovered.mean >= 0.9
-
-
-def test_a_mirror_that_stays_raises_no_alarm():
-    made = study(
-        FakeMirrors(), dataclasses.replace(PLAN, turned_by=0.0, repeats=1)
-    )
-    mirrors = {each.number: each.mirror for each in made.repeats}
-    result = watch(made, made.by_hand(mirrors))
-    assert result.delays == [None]
-    assert result.noticed.mean == 0.0
-    assert result.recovered is None
-
-
-def test_a_repeat_without_a_mirror_is_not_watched(made):
-    lost = Calibrated(None, made.truth, None, failure="nothing is seen")
-    found = made.by_hand({0: made.repeats[0].mirror}) | {1: lost}
-    assert len(watch(made, found).delays) == 1
 
 
 def test_what_was_not_struck_did_not_sound():

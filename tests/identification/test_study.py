@@ -184,6 +184,7 @@ def test_the_key_of_a_stored_fit_stays(tmp_path, monkeypatch):
         joint=RobotJoint(name="elbow", actuator="arm", kP=2.0),
         controller=RobotController(joints=[RobotJoint(name="elbow")]),
         supply=PneumaticParameters(
+            supply_pressure=659.3e3,
             classes={"arm": ActuatorClass()},
             joints={"elbow": JointActuator(actuator="arm")},
         ),

@@ -117,7 +117,7 @@ def test_resting_pressure_of_tight_valves_is_in_the_middle():
     array = simple().for_joints(["one"], [0.0], [1.0])
     array[Row.UNDERLAP] = 0.0
     assert resting_pressure(array)[0] == pytest.approx(
-        0.5 * (101.3e3 + 659.3e3)
+        0.5 * (101.3e3 + 701.3e3)
     )
     array[Row.C_LEAK] = 1e-12
     assert resting_pressure(array)[0] == pytest.approx(101.3e3)

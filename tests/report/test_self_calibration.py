@@ -4,8 +4,9 @@ import copy
 
 import pytest
 
+from drake_affetto import report
 from support import report_data
-from support.report_page import make
+from support.report_page import Page, make
 
 RATE = {"mean": 0.9, "low": 0.8, "high": 0.95}
 PLANE = {
@@ -63,6 +64,9 @@ def results():
                 "false_alarms": 0,
                 "quiet_strokes": 10,
                 "recovered": RATE,
+                "quiet_looks": 1,
+                "noticed_by_strokes": RATE | {"mean": 0.4, "low": 0.1},
+                "false_alarms_by_strokes": 2,
             },
             "beliefs": [
                 {"method": "ear", "step": 0, "lines": [line, line]},
@@ -89,8 +93,10 @@ def test_the_page_tells_what_it_took(tmp_path):
         "94 %",
         "0.6°, 3 mm",
         "strokes 13 to 24",
-        "it noticed within six strokes in 100 %",
+        "it so noticed within six strokes in 100 %",
         "somewhere on my left",
+        "took 10 looks in a hundred strokes",
+        "Strokes alone would have told in 40 %",
     ):
         assert words in made.text, words
 
@@ -107,3 +113,25 @@ def test_parts_may_be_missing(tmp_path, missing):
     made = make(tmp_path, mirror=plain)
     assert "self_calibration" in made.sections()
     assert ("belief" in drawn(made)) == (missing != "beliefs")
+
+
+def test_it_stands_beside_the_schemes_with_demonstrations(tmp_path):
+    made = make(tmp_path, mirror=report_data.mirror(), by_itself=results())
+    assert {"mirror", "self_calibration"} <= set(made.sections())
+    alone = make(tmp_path / "alone", by_itself=results())
+    assert "mirror" not in alone.sections()
+    assert "Affetto finds the mirror by itself" in alone.text
+    # The headline numbers.
+    assert "without a demonstration, by its hand in the mirror" in alone.text
+    assert "of mirrors turned by 5° noticed" in alone.text
+
+
+def test_its_replay_waits_until_it_is_asked_for(tmp_path):
+    folder = report_data.write(tmp_path / "s", results())
+    (folder / "self_calibration.html").write_text(report_data.REPLAY)
+    made = Page(report.write_report([folder], tmp_path / "page.html"))
+    (stage,) = made.all("div", **{"class": "stage"})
+    assert stage["data-replay"] == "self_calibration"
+    assert "self_calibration" in {each.get("id") for each in made.all("script")}
+    # Its media are not those of the section on trials.
+    assert "seen" not in made.sections()

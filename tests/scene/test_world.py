@@ -154,7 +154,7 @@ def test_limits_in_the_order_of_the_names(scene):
     assert np.degrees(low) == pytest.approx([0, -45], abs=1e-3)
     assert np.degrees(high) == pytest.approx([130, 45], abs=1e-3)
     effort = world.effort_limits(scene.plant, ["right_elbow_flexion"])
-    assert effort == pytest.approx([2.8])
+    assert effort == pytest.approx([3.0])
 
 
 def test_a_default_posture_replaces_the_scene_s(scene):

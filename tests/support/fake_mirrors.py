@@ -4,9 +4,12 @@ The movement is the task parameter itself: a stroke lands where it is aimed. As
 on the robot, the true mirror is in the spec alone.
 """
 
+import functools
+
 import numpy as np
 
-from drake_affetto.experiments.mirror_setup import pose_matrix, true_knowledge
+from drake_affetto.calibration.knowledge import RobotKnowledge
+from drake_affetto.experiments.mirror_setup import MirrorSetup, pose_matrix
 from drake_affetto.geometry.planes import normals
 from drake_affetto.scene.world import FramePose
 from support import mirror_robot
@@ -15,9 +18,19 @@ SCENARIO, DIRECT = "mirror", "drumming"
 REACH = 0.05
 
 
+@functools.cache
+def setup() -> MirrorSetup:
+    return MirrorSetup.of(SCENARIO, DIRECT)
+
+
+@functools.cache
+def truth() -> RobotKnowledge:
+    return setup().true_knowledge()
+
+
 def plane_of(pose: dict) -> np.ndarray:
     """The plane (3,) of a spec's mirror, told from the robot's eye."""
-    eye = true_knowledge(SCENARIO, DIRECT).eye_position
+    eye = truth().eye_position
     X_WM = pose_matrix(FramePose(**pose))
     n = X_WM[:3, 2]
     plane = np.array([np.arctan2(n[1], n[0]), np.arcsin(n[2]), 0.0])
@@ -48,7 +61,7 @@ class FakeMirrors:
         return plane_of(self.always or spec["mirror"])
 
     def _hand_look(self, spec, rng):
-        true = true_knowledge(SCENARIO, DIRECT)
+        true = truth()
         readings = np.array(spec["posture"]) + 1e-3 * rng.normal(size=8)
         look = mirror_robot.sees_hand(
             true, self._mirror(spec), readings, rng, 0.4
@@ -62,7 +75,7 @@ class FakeMirrors:
         return result, {}
 
     def _seen(self, spec, rng) -> dict:
-        true = true_knowledge(SCENARIO, DIRECT)
+        true = truth()
         if "mirror" not in spec:
             tau = true.optical_map().source.direct_task_parameters(
                 np.array([spec["xy"]]), true.source_calibration
@@ -76,14 +89,14 @@ class FakeMirrors:
         return self._seen(spec, rng) | {"duration": 1.0}, {}
 
     def _ellipse_look(self, spec, rng):
-        true = true_knowledge(SCENARIO, DIRECT)
+        true = truth()
         look = mirror_robot.sees_ellipse(
             true, self._mirror(spec), spec["xy"], rng, 0.03
         )
         return self._seen(spec, rng) | {"moments": look.moments.tolist()}, {}
 
     def _demonstration(self, spec, rng):
-        true = true_knowledge(SCENARIO, DIRECT)
+        true = truth()
         tau = true.optical_map().source.direct_task_parameters(
             np.array([spec["xy"]]), true.source_calibration
         )[0]
@@ -103,10 +116,9 @@ class FakeMirrors:
         return result, arrays
 
     def _strike(self, spec, rng):
-        from drake_affetto.experiments.mirror_setup import _view
         from drake_affetto.experiments.view_maps import places_of
 
-        aimed = places_of(_view(DIRECT), spec["theta"][None, :2])[0]
+        aimed = places_of(setup().direct, spec["theta"][None, :2])[0]
         miss = float(np.linalg.norm(aimed - spec["xy"]))
         hit = miss < REACH
         result = {

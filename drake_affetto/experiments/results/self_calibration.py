@@ -102,6 +102,11 @@ class WatchResult:
         quiet_strokes: Number of strokes in which there could be such alarms.
         recovered: Success after the robot calibrated again; None if it did
             not.
+        quiet_looks: Number of looks at the hand in the quiet strokes.
+        noticed_by_strokes: Share of repeats in which strokes alone would have
+            told within six; None if that was not counted.
+        false_alarms_by_strokes: Alarms by strokes alone while the belief was
+            right.
     """
 
     turned_by: float
@@ -111,6 +116,9 @@ class WatchResult:
     false_alarms: int
     quiet_strokes: int
     recovered: SuccessRate | None = None
+    quiet_looks: int = 0
+    noticed_by_strokes: SuccessRate | None = None
+    false_alarms_by_strokes: int = 0
 
 
 @dataclasses.dataclass(frozen=True)

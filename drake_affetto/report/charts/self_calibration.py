@@ -12,11 +12,6 @@ from drake_affetto.experiments.results.self_calibration import (
 )
 from drake_affetto.report import style, wording
 
-METHODS = {
-    "hand": "its hand in the mirror",
-    "ellipse": "the marker's ellipse",
-    "ear": "hit or miss by ear",
-}
 # Symbols of the methods, other than those of schemes.
 _SYMBOLS = ("star", "hexagon", "pentagon")
 # Colors of the beliefs in a picture, from the first to the last.
@@ -30,12 +25,12 @@ def demonstrations_needed(
     results: MirrorResults, found: SelfCalibrationResults
 ) -> style.Chart:
     """Success over the number of demonstrations that a person gives."""
-    methods = [name for name in METHODS if name in found.methods]
+    methods = [name for name in wording.METHODS if name in found.methods]
     schemes = wording.ordered(results.schemes)
     traces: list[Any] = []
     for k, name in enumerate(methods):
         rate = found.methods[name].success_rate
-        label = style.escaped(METHODS[name])
+        label = style.escaped(wording.METHODS[name])
         traces.append(
             go.Scatter(
                 name=f"none: {label}",
@@ -74,7 +69,7 @@ def demonstrations_needed(
         "Without a demonstration: "
         + wording.joined(
             [
-                f"{METHODS[name]} "
+                f"{wording.METHODS[name]} "
                 f"{wording.percent(found.methods[name].success_rate.mean)}"
                 for name in methods
             ]
@@ -92,7 +87,10 @@ def demonstrations_needed(
         ),
         ("way", *(str(n) for n in counts)),
         [
-            [METHODS[name], wording.rate(found.methods[name].success_rate)]
+            [
+                wording.METHODS[name],
+                wording.rate(found.methods[name].success_rate),
+            ]
             + ["–"] * len(results.samples)
             for name in methods
         ]
@@ -181,7 +179,9 @@ def _drawn(beliefs: Sequence[BeliefStep]) -> list[BeliefStep]:
         for each in beliefs
         if each.method == "ear" and each.step in _STROKES
     ]
-    last = {each.method: each for each in beliefs if each.method in METHODS}
+    last = {
+        each.method: each for each in beliefs if each.method in wording.METHODS
+    }
     return by_ear + [last[name] for name in ("ellipse", "hand") if name in last]
 
 
@@ -189,4 +189,4 @@ def _label(each: BeliefStep) -> str:
     if each.step == 0:
         return "somewhere on my left"
     count = wording.number(each.step, _UNITS[each.method])
-    return f"{METHODS[each.method]}, {count}"
+    return f"{wording.METHODS[each.method]}, {count}"

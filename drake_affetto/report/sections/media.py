@@ -11,15 +11,19 @@ import struct
 import numpy as np
 
 from drake_affetto.report.parts import (
+    Picture,
     Section,
     data_uri,
     picture_of_package,
     picture_of_study,
 )
 from drake_affetto.report.report_data import ReportData
-from drake_affetto.report.study_folder import read_media
+from drake_affetto.report.study_folder import StudyFolder, read_media
 
 REPLAY_TITLE = "3D replay of a direct and a mirrored trial"
+
+CALIBRATION = "self_calibration.html"
+"""Name of the replay that belongs to another section."""
 
 _CAMERA = (
     (
@@ -46,11 +50,11 @@ _CAMERA = (
 def make(data: ReportData) -> Section | None:
     """The section; None if no study has left any media."""
     folder = max(
-        data.folders.values(), key=lambda s: len(s.media), default=None
+        data.folders.values(), key=lambda s: len(_media(s)), default=None
     )
-    if folder is None or not folder.media:
+    if folder is None or not _media(folder):
         return None
-    found = folder.media
+    found = _media(folder)
     context = {
         "study": folder.study,
         "seed": folder.results.seed,
@@ -64,16 +68,7 @@ def make(data: ReportData) -> Section | None:
         "trial": None,
     }
     if "replay.html" in found:
-        page = read_media(found["replay.html"])
-        context["replay"] = {
-            "title": REPLAY_TITLE,
-            "still": picture_of_package("replay.jpg", ""),
-            "megabytes": f"{len(page) / 1e6:.0f}",
-            # Kept packed until the reader asks for it.
-            "packed": base64.b64encode(gzip.compress(page, 9, mtime=0)).decode(
-                "ascii"
-            ),
-        }
+        context["replay"] = make_replay(found["replay.html"], REPLAY_TITLE)
     if "trial.png" in found:
         context["trial"] = picture_of_study(
             found["trial.png"],
@@ -82,6 +77,49 @@ def make(data: ReportData) -> Section | None:
             "and the sound with a burst at the stroke",
         )
     return Section("seen", "See and hear", "See it, hear it", context)
+
+
+def _media(folder: StudyFolder) -> dict[str, Path]:
+    """What a folder holds of this section's media."""
+    return {
+        name: path for name, path in folder.media.items() if name != CALIBRATION
+    }
+
+
+@dataclasses.dataclass(frozen=True)
+class Replay:
+    """A replay in 3D, kept packed until the reader asks for it.
+
+    Attributes:
+        key: Name of the file without its suffix, for the page's elements.
+        title: Title of the frame in which it runs.
+        still: Picture that stands there before.
+        megabytes: Size of the file in words, MB.
+        packed: The file, packed by gzip and in base 64.
+    """
+
+    key: str
+    title: str
+    still: Picture
+    megabytes: str
+    packed: str
+
+
+def make_replay(path: Path, title: str) -> Replay:
+    """The replay in a file.
+
+    Raises:
+        InputError: If the file cannot be read.
+    """
+    page = read_media(path)
+    packed = gzip.compress(page, 9, mtime=0)
+    return Replay(
+        path.stem,
+        title,
+        picture_of_package("replay.jpg", ""),
+        f"{len(page) / 1e6:.0f}",
+        base64.b64encode(packed).decode("ascii"),
+    )
 
 
 @dataclasses.dataclass(frozen=True)

@@ -11,6 +11,7 @@ _STUDIES = {
     "drum": "success over the number of demonstrations",
     "mirror": "the schemes in one changed view, with statistics",
     "bodies": "the schemes on robots of other bodies",
+    "self_calibration": "the robot that finds the mirror by itself",
     "drum_bodies": "learning to drum on robots of other bodies",
     "scenarios": "the schemes in all changed views",
     "conditions": "when transfer wins",

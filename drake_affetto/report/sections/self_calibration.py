@@ -6,20 +6,22 @@ from drake_affetto.experiments.results.self_calibration import (
 )
 from drake_affetto.report import wording
 from drake_affetto.report.charts.self_calibration import (
-    METHODS,
     demonstrations_needed,
     shrinking_belief,
 )
 from drake_affetto.report.parts import Section, Table, make_table
 from drake_affetto.report.report_data import ReportData
+from drake_affetto.report.sections.media import CALIBRATION, make_replay
 
 
 def make(data: ReportData) -> Section | None:
     """The section; None if the robot was not asked to."""
-    results = data.results("mirror")
-    found = None if results is None else results.self_calibration
-    if found is None:
+    folder = data.folders.get("self_calibration")
+    if folder is None:
         return None
+    results = folder.results
+    found = results.self_calibration
+    replay = folder.media.get(CALIBRATION)
     charts = [
         chart
         for chart in (
@@ -38,6 +40,10 @@ def make(data: ReportData) -> Section | None:
             "table": _table(found),
             "strokes": _strokes(found),
             "watch": _watch(found),
+            "bodies": len(results.bodies),
+            "replay": None
+            if replay is None
+            else make_replay(replay, "3D replay of looks at the hand"),
             "charts": charts,
         },
         tuple(charts),
@@ -49,7 +55,7 @@ def _table(found: SelfCalibrationResults) -> Table:
         ("by", "success", "looks", "own strokes", "plane off by", "covered"),
         [
             [
-                METHODS.get(name, name),
+                wording.METHODS.get(name, name),
                 wording.rate(method.success_rate),
                 f"{method.looks:.1f}",
                 f"{method.strokes:.0f}",
@@ -89,12 +95,20 @@ def _watch(found: SelfCalibrationResults) -> str:
     watch = found.watch
     if watch is None:
         return ""
+    rate = wording.rate(watch.noticed)
+    looks = f"{100 * watch.quiet_looks / max(1, watch.quiet_strokes):.0f}"
+    alarms = wording.number(watch.false_alarms, "false alarm")
     text = (
-        f"When the mirror was turned by {watch.turned_by:g}°, it noticed "
-        f"within six strokes in {wording.rate(watch.noticed)} of the repeats, "
-        f"with {wording.number(watch.false_alarms, 'false alarm')} in "
-        f"{watch.quiet_strokes} strokes before."
+        "After a stroke that should have been heard and was not, the robot "
+        "looks at its hand again. When the mirror was turned by "
+        f"{watch.turned_by:g}°, it so noticed within six strokes in {rate} of "
+        f"the repeats, with {alarms} in {watch.quiet_strokes} strokes before "
+        f"unmoved mirrors, which took {looks} looks in a hundred strokes."
     )
+    if watch.noticed_by_strokes is not None:
+        alone = wording.rate(watch.noticed_by_strokes)
+        alarms = wording.number(watch.false_alarms_by_strokes, "false alarm")
+        text += f" Strokes alone would have told in {alone}, with {alarms}."
     if watch.recovered is not None:
         text += (
             " After looking at its hand again it hit in "

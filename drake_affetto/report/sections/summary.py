@@ -31,6 +31,7 @@ def make(data: ReportData) -> Section:
     tiles = [
         *_drumming_tiles(data),
         *_transfer_tiles(data),
+        *_self_calibration_tiles(data),
         *_toy_tiles(data),
         *_tuning_tiles(data),
     ] or _few_tiles(data)
@@ -105,6 +106,31 @@ def _transfer_tiles(data: ReportData) -> list[Tile]:
                 wording.percent(comparison.rates["unchanged"][n].mean),
                 "the same skill without transfer",
                 f"in the view: {wording.scenario(comparison.scenario)}",
+            )
+        )
+    return tiles
+
+
+def _self_calibration_tiles(data: ReportData) -> list[Tile]:
+    results = data.results("self_calibration")
+    if results is None:
+        return []
+    found = results.self_calibration
+    name = "hand" if "hand" in found.methods else next(iter(found.methods))
+    method = found.methods[name]
+    tiles = [
+        Tile(
+            wording.percent(method.success_rate.mean),
+            f"without a demonstration, by {wording.METHODS.get(name, name)}",
+            f"{method.looks:.0f} looks, {found.repeats} mirrors",
+        )
+    ]
+    if found.watch is not None:
+        tiles.append(
+            Tile(
+                wording.percent(found.watch.noticed.mean),
+                f"of mirrors turned by {found.watch.turned_by:g}° noticed",
+                "within six strokes",
             )
         )
     return tiles

@@ -46,19 +46,19 @@
   narrow.addEventListener("change", drawAll);
   drawAll();
 
-  // The replay is a page of its own, kept packed until it is asked for. It
-  // runs in a frame that cannot reach this page.
-  const stage = document.querySelector(".stage");
-  if (stage) {
-    const packed = document.getElementById("replay").textContent;
-    const again = document.querySelector(".again");
+  // A replay is a page of its own, kept packed until it is asked for. It runs
+  // in a frame that cannot reach this page.
+  for (const stage of document.querySelectorAll(".stage")) {
+    const { replay, title } = stage.dataset;
+    const packed = document.getElementById(replay).textContent;
+    const again = stage.parentElement.querySelector(".again");
     let unpacked;
     async function show() {
       const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
       const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
       unpacked ??= await new Response(stream).text();
       const frame = document.createElement("iframe");
-      frame.title = stage.dataset.title;
+      frame.title = title;
       frame.setAttribute("sandbox", "allow-scripts");
       frame.tabIndex = 0;
       frame.srcdoc = unpacked;
@@ -72,7 +72,7 @@
       try {
         (await show()).focus();
       } catch (error) {
-        event.target.textContent = "This browser cannot unpack it: open replay.html instead";
+        event.target.textContent = `This browser cannot unpack it: open ${replay}.html instead`;
       }
     });
     again.addEventListener("click", show);
