@@ -29,6 +29,7 @@ ORDER = [
     {"pneumatics"},
     {"sensing"},
     {"sound"},
+    {"faults"},
     {"teaching"},
     {"station", "scenario"},
     {"robot"},
@@ -41,7 +42,7 @@ ORDER = [
     {"cli"},
 ]
 RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
-STAGES = [name for names in ORDER[1:12] for name in names]
+STAGES = [name for names in ORDER[1:13] for name in names]
 
 # The mathematics, which must also serve who has no Drake. The test adds to
 # them every module of a stage that does not import Drake in its own text.
@@ -386,8 +387,12 @@ TESTED_IN = {
     "experiments/calibration_media": (
         "experiments/test_self_calibration_study.py"
     ),
+    "experiments/fault_injection": "experiments/test_watched.py",
     "experiments/media": "experiments/test_demo.py",
     "experiments/results": "experiments/results/test_study.py",
+    "faults/camera_faults": "station/test_fault_wiring.py",
+    "faults/fault_source": "station/test_fault_wiring.py",
+    "faults/supervisor": "station/test_fault_wiring.py",
     "identification/plots": "identification/test_study.py",
     "identification/prediction": "identification/test_study.py",
     "identification/results": "identification/test_study.py",

@@ -29,7 +29,7 @@ _COLORS = {
     "#cfe3f7": ("scene", "perception", "calibration"),
     "#dcd3f2": ("skill", "motion"),
     "#fbeeb8": ("control", "pneumatics", "sensing"),
-    "#d3efd0": ("sound", "teaching"),
+    "#d3efd0": ("sound", "faults", "teaching"),
     "#f7d4e3": ("station",),
     "#fbdcc4": ("robot", "runner", "experiments", "tuning", "identification"),
     "#cdeeea": ("report", "cli"),

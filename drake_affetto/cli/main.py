@@ -32,6 +32,7 @@ COMMANDS = {
     "demo": "teach, drum, look through the mirror, transfer",
     "drum": "learn to drum from demonstrations (Fig. 3)",
     "mirror": "drum in a changed view, by transfer (Fig. 5)",
+    "faults": "what faults do to the robot, and whether it notices",
     "teach": "record demonstrations in a file",
     "look": "show what the camera sees; calibrate it",
     "toy": "the paper's toy experiment of transfer (Fig. 2)",

@@ -8,10 +8,12 @@ if TYPE_CHECKING:
     from drake_affetto.experiments.demo import run_demo
     from drake_affetto.experiments.drumming import run_drum
     from drake_affetto.experiments.episode import TrialRunner
+    from drake_affetto.experiments.faults import run_faults
     from drake_affetto.experiments.mirror import run_mirror
     from drake_affetto.experiments.plans import (
         DemoPlan,
         DrumPlan,
+        FaultsPlan,
         MirrorPlan,
         TeachPlan,
         ToyPlan,
@@ -30,6 +32,7 @@ __getattr__, __dir__, __all__ = attach(
     {
         "DemoPlan": "plans",
         "DrumPlan": "plans",
+        "FaultsPlan": "plans",
         "MirrorPlan": "plans",
         "Signals": "signals",
         "TeachPlan": "plans",
@@ -40,6 +43,7 @@ __getattr__, __dir__, __all__ = attach(
         "run_again": "signals",
         "run_demo": "demo",
         "run_drum": "drumming",
+        "run_faults": "faults",
         "run_mirror": "mirror",
         "run_toy": "toy",
         "teach": "teaching",

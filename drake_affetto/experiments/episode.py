@@ -3,6 +3,8 @@
 Each trial runs the whole station. A `TrialRunner` builds its Diagram once;
 trials change the context only, and what a trial gives depends on its
 arguments alone, not on the trials before it.
+
+Long: all that one runner does with its one Diagram.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,6 +21,8 @@ from pydrake.systems.framework import (
 from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
 from drake_affetto.common.typing import Array
+from drake_affetto.experiments.fault_injection import FaultInjection
+from drake_affetto.faults.supervisor import Verdict
 from drake_affetto.motion.dmp import Dmp
 from drake_affetto.perception import gaze as gaze_state
 from drake_affetto.perception.gaze import GazePhase
@@ -133,12 +137,13 @@ class _Look:
     """The last search of a runner, and the station at its end.
 
     Attributes:
-        key: Position of the drum, seed of the trial and pose of the mirror.
+        key: Position of the drum, seed of the trial, pose of the mirror and
+            faults.
         outcome: Outcome of the search.
         end: Context at its end.
     """
 
-    key: tuple[float, float, int, world.FramePose | None]
+    key: tuple[float, float, int, world.FramePose | None, str]
     outcome: GazeOutcome
     end: Context
 
@@ -213,6 +218,9 @@ class TrialRunner:
         self._mirror: world.FramePose | None = None
         self._looked: _Look | None = None
         self._taps: list[Array] | None = None
+        self.injection: FaultInjection | None = None
+        if self.station.faults is not None:
+            self.injection = FaultInjection(self)
 
     def place_mirror(self, pose: world.FramePose | None) -> None:
         """Puts the mirror there in the trials to come; None: as the scenario.
@@ -330,7 +338,7 @@ class TrialRunner:
         begin = self.settle(xy, seed)
         # What holds the arm at rest will hold it while it is guided.
         self.advance(begin + teaching.settling_time)
-        u_eq = self._log("affetto.pid_output")[1].mean(axis=0)
+        u_eq = self.log("affetto.pid_output")[1].mean(axis=0)
         controller = self._sub(station.controller)
         gains = station.controller.get_gains(controller)
         station.controller.set_gains(
@@ -343,8 +351,8 @@ class TrialRunner:
         """Records the guided movement from the time `grasped` on, s."""
         self._clear_logs()
         self.advance(grasped + self.scenario.teaching.duration)
-        t, state = self._log("affetto.estimated_state")
-        _, pull = self._log("teacher.pulling_force")
+        t, state = self.log("affetto.estimated_state")
+        _, pull = self.log("teacher.pulling_force")
         t = t - grasped
         q = state[:, : self.station.num_joints]
         return GuidedMovement(
@@ -363,8 +371,9 @@ class TrialRunner:
             seed: Seed of the microphone's noise and the robot's variation.
         """
         start = self.settle(xy, seed) + self.scenario.policy.delay
+        self._watch()
         self.play(theta, start)
-        return self._record(start, seed)
+        return self.record(start, seed)
 
     def play(self, theta: Array, start: float) -> None:
         """Has the movement θ (n·K,) begin at the time `start`, s.
@@ -402,7 +411,7 @@ class TrialRunner:
                 raise RuntimeError("the gaze has settled but is never ready")
             self.advance(self.context.get_time() + FRAME_PERIOD)
         start = float(self.port("affetto.start_time")[0])
-        return outcome, self._record(start, seed)
+        return outcome, self.record(start, seed)
 
     def look(self, xy: Array, seed: int) -> GazeOutcome:
         """The search for the drum, at whose end the station then is.
@@ -415,7 +424,8 @@ class TrialRunner:
             xy: Position of the drum (2,), m.
             seed: Seed of the trial.
         """
-        key = (float(xy[0]), float(xy[1]), seed, self._mirror)
+        faults = "" if self.injection is None else self.injection.key
+        key = (float(xy[0]), float(xy[1]), seed, self._mirror, faults)
         if self._looked is None or self._looked.key != key:
             outcome = self.gaze(xy, seed)
             if self._looked is None:
@@ -428,6 +438,12 @@ class TrialRunner:
         self._clear_logs()
         self.simulator.Initialize()
         return self._looked.outcome
+
+    def look_again(self) -> GazeOutcome:
+        """Searches for the drum once more, where a movement has ended."""
+        self.station.gaze.reset(self._sub(self.station.gaze))
+        self.simulator.Initialize()
+        return self._wait_for_gaze(self.context.get_time())
 
     def palm_path(self, state: Array) -> Array:
         """Positions (T, 3) of the palm, m in the world.
@@ -489,6 +505,8 @@ class TrialRunner:
         if self._mirror is not None:
             self.station.set_mirror_pose(self._station_context, self._mirror)
         self.station.set_seed(self._station_context, seed)
+        if self.injection is not None:
+            self.injection.begin(xy, seed)
         self._clear_logs()
         self.simulator.Initialize()
         return self.context.get_time()
@@ -506,7 +524,13 @@ class TrialRunner:
                     target
                 ).SetStateAndParametersFrom(system.GetMyContextFromRoot(source))
 
+    def _watch(self) -> None:
+        """Has the supervisor watch what follows, if there is one."""
+        if self.injection is not None:
+            self.injection.watch(True)
+
     def _enable_gaze(self) -> None:
+        self._watch()
         self.station.gaze.set_enabled(self._sub(self.station.gaze), True)
 
     def _wait_for_gaze(
@@ -516,6 +540,8 @@ class TrialRunner:
         settled = gaze.get_settled_output_port()
         failed = gaze.GetOutputPort("failed")
         while not settled.Eval(context)[0] and not failed.Eval(context)[0]:
+            if not self.verdict.valid:
+                break
             self._advance_frame(begin, on_frame)
         return GazeOutcome(
             found=bool(settled.Eval(context)[0]),
@@ -532,7 +558,7 @@ class TrialRunner:
         if on_frame is not None:
             on_frame(self.context.get_time() - begin)
 
-    def _record(self, start: float, seed: int) -> Recording:
+    def record(self, start: float, seed: int) -> Recording:
         """Simulates the movement that starts at `start`, with its sound."""
         self.advance(start)
         self._clear_logs()
@@ -549,10 +575,10 @@ class TrialRunner:
             seed: Seed of the microphone's noise.
         """
         self.advance(self.context.get_time() + _RINGING)
-        t, contact = self._log("drum.contact_force")
-        _, knock = self._log("drum.knock_force")
-        _, flow = self._log("affetto.mass_flow")
-        joint_t, state = self._log("affetto.estimated_state")
+        t, contact = self.log("drum.contact_force")
+        _, knock = self.log("drum.knock_force")
+        _, flow = self.log("affetto.mass_flow")
+        joint_t, state = self.log("affetto.estimated_state")
         # A contact's force is that over the plant's step from then on.
         t = t - start + 0.5 * self.scenario.plant_config.time_step
         sound = self.voice.synthesize(
@@ -564,6 +590,8 @@ class TrialRunner:
             np.abs(flow),
             np.random.default_rng([seed, 0x50BD]),
         )
+        if self.injection is not None:
+            sound = self.injection.hear(sound, start, start + float(t[0]))
         return Recording(
             t=t,
             contact_force=contact,
@@ -571,20 +599,29 @@ class TrialRunner:
             hiss_flow=np.linalg.norm(flow, axis=1),
             joint_t=joint_t - start,
             joint_state=state,
-            true_state=self._log("affetto.joint_state")[1],
-            desired_state=self._log("affetto.desired_state")[1],
-            chamber_pressure=self._log("affetto.chamber_pressure")[1],
-            valve_opening=self._log("affetto.valve_opening")[1],
+            true_state=self.log("affetto.joint_state")[1],
+            desired_state=self.log("affetto.desired_state")[1],
+            chamber_pressure=self.log("affetto.chamber_pressure")[1],
+            valve_opening=self.log("affetto.valve_opening")[1],
             sound=sound,
             sound_rate=self.voice.rate,
         )
 
     def advance(self, time: float) -> None:
         """Simulates until `time`, s."""
-        if time > self.context.get_time():
+        if time <= self.context.get_time():
+            return
+        if self.injection is not None:
+            self.injection.advance(time)
+        else:
             self.simulator.AdvanceTo(time)
 
-    def _log(self, name: str) -> tuple[Array, Array]:
+    @property
+    def verdict(self) -> Verdict:
+        """What the supervisor says of the trial so far; valid without one."""
+        return Verdict() if self.injection is None else self.injection.verdict
+
+    def log(self, name: str) -> tuple[Array, Array]:
         """Times (T,) and values (T, size) of a log, each time once."""
         log = self._logs[name].FindLog(self.context)
         t = log.sample_times()

@@ -274,6 +274,35 @@ class DemoPlan(Plan):
 
 
 @dataclasses.dataclass(frozen=True)
+class FaultsPlan(Plan):
+    """How many trials are run with faults.
+
+    Attributes:
+        repeats: Number of trials of each fault and size, and as many without.
+        demonstrations: Number of demonstrations that the skill is learned from.
+        scenario: Scenario with a supervisor, by name or path.
+        catalog: YAML file of the faults.
+        seed: Seed of everything that is random.
+    """
+
+    repeats: int = number(
+        10, 1, 1000, "trials of each fault and size, and as many without"
+    )
+    demonstrations: int = number(
+        25, 3, 1000, "number of demonstrations that the skill is learned from"
+    )
+    scenario: str = option(
+        "supervised", "scenario with a supervisor, by name or YAML file"
+    )
+    catalog: str = option(
+        "package://drake_affetto/faults.yaml",
+        "YAML file of the faults and their sizes",
+        metavar="FILE",
+    )
+    seed: int = number(0, 0, GREATEST_SEED, "seed of everything that is random")
+
+
+@dataclasses.dataclass(frozen=True)
 class TeachPlan(Plan):
     """How many demonstrations are taught into a file.
 

@@ -14,8 +14,11 @@ kinds are
     hand_look      the arm goes to a posture, at which the hand's marker is
                    looked for in the mirror
     ellipse_look   the gaze, then the shape of the drum's marker
+    watched        the whole chain with faults, as far as the supervisor lets it
 
 and `drake_affetto.experiments.results` has the result of each.
+
+Long: all kinds of trial stand side by side.
 """
 
 from collections.abc import Callable, Container, Mapping, Sequence
@@ -48,6 +51,8 @@ from drake_affetto.experiments.results.trial import (
     pack,
     unpack,
 )
+from drake_affetto.experiments.watched import run_watched
+from drake_affetto.faults.config import Fault
 from drake_affetto.geometry.region import spread_inside
 from drake_affetto.perception.blob import BlobCalibration, BlobConfig
 from drake_affetto.runner.executor import Key, Result, Spec, TrialExecutor
@@ -306,6 +311,35 @@ def hand_look(
     )
 
 
+def watched(
+    scenario: str,
+    xy: Sequence[float],
+    seed: int,
+    regressor: Regressor,
+    prototypes: np.ndarray,
+    faults: Sequence[Fault] = (),
+) -> Spec:
+    """The spec of the whole chain with faults, watched by the supervisor.
+
+    Args:
+        scenario: Scenario with a supervisor, by name or path.
+        xy: Position of the drum (2,), m.
+        seed: Seed of the noise and of what is random in the faults.
+        regressor: Skill, from task parameters to parameters of a movement.
+        prototypes: Prototypes of the reward (N, bands, frames).
+        faults: Faults of the trial, in place of the scenario's.
+    """
+    return _spec(
+        "watched",
+        scenario,
+        xy=list(xy),
+        seed=seed,
+        regressor=regressor,
+        prototypes=np.asarray(prototypes, float),
+        faults=[dataclasses.asdict(each) for each in faults],
+    )
+
+
 def ellipse_look(scenario: str, xy: Sequence[float], seed: int) -> Spec:
     """The spec of a look at the shape of the drum's marker at xy."""
     return _spec("ellipse_look", scenario, xy=list(xy), seed=seed)
@@ -346,6 +380,7 @@ def run_trial(
         "strike": _run_strike,
         "hand_look": _run_hand_look,
         "ellipse_look": _run_ellipse_look,
+        "watched": run_watched,
     }
     kind = spec["kind"]
     if kind not in kinds:

@@ -1,7 +1,7 @@
 """The actuators as a system: valve commands in, joint torques out."""
 
 import dataclasses
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,6 +31,7 @@ from drake_affetto.pneumatics.chamber import (
     memory_size,
     step_joints,
 )
+from drake_affetto.pneumatics.conditions import CONDITION_ROWS
 from drake_affetto.pneumatics.equilibrium import chamber_torque
 from drake_affetto.pneumatics.parameters import (
     DEFAULT_FILE,
@@ -92,6 +93,8 @@ class PneumaticActuation(LeafSystem):
         - valve_opening (in flow mode)
         - pressure_command (in regulator mode)
         - estimated_state
+        - valve_conditions (if `faulty`)
+        - valve_action (if `faulty`)
         output_ports:
         - actuation
         - chamber_pressure
@@ -101,6 +104,10 @@ class PneumaticActuation(LeafSystem):
       chamber b (v⁻ = -v⁺); clipped.
     - `pressure_command` (2n): set-points [p_a; p_b], Pa absolute.
     - `estimated_state` (2n): [q; q̇], rad and rad/s.
+    - `valve_conditions` (8n + 1): what is wrong with valves and chambers, see
+      `conditions.Condition`, and what the supply has above its parameter, Pa.
+    - `valve_action` (1): `conditions.NO_ACTION`, `VENT` or `REST`, above any
+      command.
     - `actuation` (n): torque on the joint, N m: of both chambers, minus
       Coulomb and Stribeck friction. Viscous friction is the plant's damping.
     - `chamber_pressure` (2n): [p_a; p_b], Pa absolute.
@@ -116,7 +123,7 @@ class PneumaticActuation(LeafSystem):
     """
 
     # Indices of the input ports, in the order of their declaration.
-    _COMMAND, _STATE = 0, 1
+    _COMMAND, _STATE, _CONDITIONS, _ACTION = range(4)
 
     def __init__(
         self,
@@ -127,6 +134,7 @@ class PneumaticActuation(LeafSystem):
         time_step: float = 0.001,
         look_ahead: float = 0.0,
         max_dead_time: float | None = None,
+        faulty: bool = False,
     ):
         """Declares ports, state and the periodic update.
 
@@ -139,6 +147,8 @@ class PneumaticActuation(LeafSystem):
             look_ahead: see `PneumaticActuationConfig`.
             max_dead_time: longest dead time that parameters set later may
                 have, s; by default the longest among `parameters`.
+            faulty: whether there are inputs for faults and for an action above
+                the command.
 
         Raises:
             InputError: for arguments that do not fit.
@@ -175,6 +185,12 @@ class PneumaticActuation(LeafSystem):
         else:
             self.DeclareVectorInputPort("pressure_command", 2 * n)
         self.DeclareVectorInputPort("estimated_state", 2 * n)
+        self._faulty = faulty
+        if faulty:
+            self.DeclareVectorInputPort(
+                "valve_conditions", CONDITION_ROWS * 2 * n + 1
+            )
+            self.DeclareVectorInputPort("valve_action", 1)
 
         rest = resting_pressure(array)
         pressure = np.concatenate([rest, rest])
@@ -204,6 +220,7 @@ class PneumaticActuation(LeafSystem):
         estimated_state: OutputPort,
         config: PneumaticActuationConfig | None = None,
         longest_delay: float = 0.0,
+        faulty: bool = False,
         name: str = "pneumatic_actuation",
     ) -> "PneumaticActuation":
         """Adds the actuators of `joints`, whose torques drive `plant`.
@@ -217,6 +234,7 @@ class PneumaticActuation(LeafSystem):
             estimated_state: [q; q̇] (2n) of the joints, rad and rad/s.
             config: Mode and parameters.
             longest_delay: The most that a trial adds to a dead time, s.
+            faulty: Whether there are inputs for faults.
             name: Name of the system.
 
         Raises:
@@ -234,6 +252,7 @@ class PneumaticActuation(LeafSystem):
             time_step=plant.time_step(),
             look_ahead=config.look_ahead,
             max_dead_time=largest_dead_time(array) + longest_delay,
+            faulty=faulty,
         )
         return add_actuation(
             builder, plant, joints, estimated_state, system, name
@@ -244,6 +263,8 @@ class PneumaticActuation(LeafSystem):
         index=_COMMAND,
     )
     get_estimated_state_input_port = input_port("[q; q̇] (2n), rad and rad/s.")
+    get_valve_conditions_input_port = input_port("What is wrong (8n + 1).")
+    get_valve_action_input_port = input_port("What is above the command (1).")
     get_actuation_output_port = output_port("Torque on each joint (n), N m.")
     get_chamber_pressure_output_port = output_port(
         "[p_a; p_b] (2n), Pa absolute."
@@ -364,6 +385,16 @@ class PneumaticActuation(LeafSystem):
 
     def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
         mutable = discrete_state.get_mutable_value
+        change = supply_change(
+            context.get_numeric_parameter(self._breath_index).value(),
+            context.get_time(),
+        )
+        wrong: tuple[Any, ...] = ()
+        if self._faulty:
+            conditions = self.EvalVectorInput(context, self._CONDITIONS).value()
+            action = self.EvalVectorInput(context, self._ACTION).value()
+            change += conditions[-1]
+            wrong = (int(action[0]), conditions[:-1])
         step_joints(
             self._time_step,
             self._mode,
@@ -376,10 +407,8 @@ class PneumaticActuation(LeafSystem):
             mutable(self._torque_index),
             mutable(self._flow_index),
             mutable(self._memory_index),
-            supply_change(
-                context.get_numeric_parameter(self._breath_index).value(),
-                context.get_time(),
-            ),
+            change,
+            *wrong,
         )
 
 

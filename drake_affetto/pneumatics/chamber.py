@@ -48,6 +48,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from drake_affetto.pneumatics.conditions import NO_ACTION, VENT, Condition
 from drake_affetto.pneumatics.flow import (
     GAS_CONSTANT,
     REFERENCE_DENSITY,
@@ -130,6 +131,9 @@ _SUPPLY = int(Row.SUPPLY)
 _ATMOSPHERE = int(Row.ATMOSPHERE)
 _TEMPERATURE = int(Row.TEMPERATURE)
 _EXPONENT = int(Row.EXPONENT)
+_SPOOL = int(Condition.SPOOL)
+_LAG = int(Condition.LAG)
+_LEAK = int(Condition.LEAK)
 
 _HEAD = 2
 """Leading entries of the memory: whether it is filled, the line's head."""
@@ -416,6 +420,8 @@ def step_joints(
     mass_flow: NDArray[np.float64],
     memory: NDArray[np.float64],
     supply_change: float = 0.0,
+    action: int = NO_ACTION,
+    conditions: NDArray[np.float64] | None = None,
 ) -> None:
     """Advances `n` joints by `h`, in place.
 
@@ -433,6 +439,9 @@ def step_joints(
         memory: see `memory_size`; advanced. Where its first entry is 0 it is
             filled first: valves at rest, ambient temperature, friction at 0.
         supply_change: what the supply has above its parameter now, Pa.
+        action: `NO_ACTION`, `VENT` or `REST`.
+        conditions: (CONDITION_ROWS · 2n), see `conditions`; None:
+            all is well.
     """
     # Here and not in Python, where even this counts a thousand times a second.
     parameters = parameters.reshape(ROWS, parameters.size // ROWS)
@@ -503,7 +512,19 @@ def step_joints(
             target += weight * line[second * 2 * n + c]
             if mode == REGULATOR_MODE:
                 target = parameters[_REGULATOR_GAIN, i] * (target - pressure[c])
+            if action != NO_ACTION:
+                target = -1.0 if action == VENT else 0.0
             target = min(max(target, -1.0), 1.0)
+            forced = 0.0
+            leak = parameters[_C_LEAK, i]
+            if conditions is not None:
+                forced = conditions[c]
+                leak += conditions[_LEAK * 2 * n + c]
+                lag = parameters[_VALVE_LAG, i] * conditions[_LAG * 2 * n + c]
+                decay = math.exp(-h / lag) if lag > 0.0 else 0.0
+                if forced == 1.0:
+                    target = conditions[_SPOOL * 2 * n + c]
+                    spool[c] = target
             # The lag's mean over the step, which is what the air sees.
             offset = spool[c] - target
             stroke = target
@@ -515,7 +536,10 @@ def step_joints(
             c_out = parameters[_C_EXHAUST, i] * opening_fraction(
                 -stroke, underlap
             )
-            c_out += parameters[_C_LEAK, i]
+            if forced == 2.0:
+                c_fill = 0.0
+                c_out = 0.0
+            c_out += leak
             if side == 0:
                 V_old = V_old_a
                 V_new = V_new_a

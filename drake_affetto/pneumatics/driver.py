@@ -68,6 +68,9 @@ Sense = Callable[
     [JointSelection, OutputPort, OutputPort], tuple[OutputPort, OutputPort]
 ]
 
+# The controller's command, to the command that reaches the valves.
+Carry = Callable[[OutputPort], OutputPort]
+
 
 @dataclasses.dataclass
 class PneumaticDriver:
@@ -206,6 +209,7 @@ def AddPneumaticDriver(
     builder: DiagramBuilder,
     sense: Sense | None = None,
     longest_delay: float = 0.0,
+    carry: Carry | None = None,
 ) -> PneumaticSystems:
     """Adds a model's pneumatics, for a diagram that has the command itself.
 
@@ -214,7 +218,8 @@ def AddPneumaticDriver(
     the joints and whoever reads them: `sense` adds them, given the joints and
     the ports of their true state and chamber pressure, and returns the ports of
     both as read. `longest_delay` is the most, s, that a trial adds to a dead
-    time.
+    time. `carry` adds what carries the controller's commands to the valves; the
+    actuators then have inputs for faults, which are left to be connected too.
 
     Args:
         model_instance: The model's instance in the plant.
@@ -238,6 +243,7 @@ def AddPneumaticDriver(
         builder,
         true_state,
         longest_delay,
+        carry is not None,
     )
     read = true_state, actuation.get_chamber_pressure_output_port()
     if sense is not None:
@@ -262,7 +268,10 @@ def AddPneumaticDriver(
             *read,
         )
         opening = controller.get_valve_opening_output_port()
-        builder.Connect(opening, actuation.get_command_input_port())
+        builder.Connect(
+            opening if carry is None else carry(opening),
+            actuation.get_command_input_port(),
+        )
         outputs += [opening, controller.get_pid_output_output_port()]
     for port in outputs:
         builder.ExportOutput(port, f"{model}.{port.get_name()}")
@@ -386,6 +395,7 @@ def _add_actuation(
     builder: DiagramBuilder,
     estimated_state: OutputPort,
     longest_delay: float,
+    faulty: bool,
 ) -> Any:
     name = f"{plant.GetModelInstanceName(joints.model_instance)}.pneumatics"
     if plant.time_step() == 0.0:
@@ -404,6 +414,7 @@ def _add_actuation(
         estimated_state=estimated_state,
         config=dataclasses.replace(config, parameters=parameters, overlays=[]),
         longest_delay=longest_delay,
+        faulty=faulty,
         name=name,
     )
 

@@ -1,6 +1,7 @@
 """The sensors of all joints as a system."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +18,7 @@ from drake_affetto.common.errors import require, require_range
 from drake_affetto.common.systems import input_port, output_port
 from drake_affetto.common.typing import Array
 from drake_affetto.sensing.readings import (
+    FAULT_ROWS,
     NOISE_ROWS,
     SensorParameters,
     memory_size,
@@ -34,12 +36,14 @@ class JointSensors(LeafSystem):
         input_ports:
         - joint_state
         - true_pressure
+        - faults (if `faulty`)
         output_ports:
         - estimated_state
         - chamber_pressure
 
     - `joint_state` (2n): [q; q̇], rad and rad/s; only the angles are read.
     - `true_pressure` (2n): [p_a; p_b], Pa.
+    - `faults` (9n): what is wrong with the readings, see `ReadingFault`.
     - `estimated_state` (2n): [q; q̇], filtered angles and their differences.
     - `chamber_pressure` (2n): [p_a; p_b] as read, Pa.
 
@@ -53,7 +57,7 @@ class JointSensors(LeafSystem):
     """
 
     # Indices of the input ports, in the order of their declaration.
-    _STATE, _PRESSURE = 0, 1
+    _STATE, _PRESSURE, _FAULTS = 0, 1, 2
 
     def __init__(
         self,
@@ -64,6 +68,7 @@ class JointSensors(LeafSystem):
         *,
         period: float = 0.005,
         lead: float = 0.0,
+        faulty: bool = False,
     ):
         """Declares ports, state and the periodic samples.
 
@@ -75,6 +80,7 @@ class JointSensors(LeafSystem):
             period: Time between two samples, s.
             lead: Time by which a sample is taken earlier, s; less than the
                 plant's step.
+            faulty: Whether there is an input for faults of the sensors.
 
         Raises:
             InputError: For arguments that do not fit.
@@ -98,11 +104,16 @@ class JointSensors(LeafSystem):
         )
         self.DeclareVectorInputPort("joint_state", 2 * n)
         self.DeclareVectorInputPort("true_pressure", 2 * n)
+        self._raw_index = None
+        if faulty:
+            self.DeclareVectorInputPort("faults", FAULT_ROWS * 3 * n)
         self._estimate_index = self.DeclareDiscreteState(2 * n)
         self._reading_index = self.DeclareDiscreteState(2 * n)
         self._memory_index = self.DeclareDiscreteState(
             memory_size(n, self._filter.shape[1] - 1)
         )
+        if faulty:
+            self._raw_index = self.DeclareDiscreteState(3 * n)
         self.DeclareStateOutputPort("estimated_state", self._estimate_index)
         self.DeclareStateOutputPort("chamber_pressure", self._reading_index)
         self.DeclarePeriodicDiscreteUpdateEvent(
@@ -122,6 +133,7 @@ class JointSensors(LeafSystem):
         limits: tuple[ArrayLike, ArrayLike],
         period: float = 0.005,
         lead: float = 0.0,
+        faulty: bool = False,
         name: str = "joint_sensors",
     ) -> "JointSensors":
         """Adds the sensors of the named joints, wired to what they read.
@@ -140,7 +152,12 @@ class JointSensors(LeafSystem):
             lead: Time by which a sample is taken early, s.
         """
         sensors = JointSensors(
-            parameters, joint_names, *limits, period=period, lead=lead
+            parameters,
+            joint_names,
+            *limits,
+            period=period,
+            lead=lead,
+            faulty=faulty,
         )
         builder.AddNamedSystem(name, sensors)
         builder.Connect(joint_state, sensors.get_joint_state_input_port())
@@ -149,6 +166,7 @@ class JointSensors(LeafSystem):
 
     get_joint_state_input_port = input_port("[q; q̇] (2n), rad and rad/s.")
     get_true_pressure_input_port = input_port("[p_a; p_b] (2n), Pa.")
+    get_faults_input_port = input_port("What is wrong (9n), `ReadingFault`.")
     get_estimated_state_output_port = output_port(
         "[q; q̇] (2n) of the robot's software, rad and rad/s."
     )
@@ -190,6 +208,12 @@ class JointSensors(LeafSystem):
         # Views of the inputs: a port's `Eval` would copy.
         read = self.EvalVectorInput
         mutable = discrete_state.get_mutable_value
+        wrong: tuple[Any, ...] = ()
+        if self._raw_index is not None:
+            wrong = (
+                read(context, self._FAULTS).value(),
+                mutable(self._raw_index),
+            )
         read_sensors(
             self._period,
             self._scales,
@@ -201,4 +225,5 @@ class JointSensors(LeafSystem):
             mutable(self._estimate_index),
             mutable(self._reading_index),
             mutable(self._memory_index),
+            *wrong,
         )

@@ -12,6 +12,7 @@ A pressure is read with noise in steps, and is not filtered.
 
 from collections.abc import Sequence
 import dataclasses
+import enum
 
 import numba
 import numpy as np
@@ -24,6 +25,21 @@ from drake_affetto.common.typing import Array
 
 NOISE_ROWS = 512
 """Samples whose noise is drawn at once."""
+
+
+class ReadingFault(enum.IntEnum):
+    """The rows of what is wrong with the readings, a column for each of 3n.
+
+    `STUCK`: 1 where a reading stays as it is. `ADDED`: what is added to it,
+    rad or Pa. `FORCED`: what it is in place of itself; NaN: nothing.
+    """
+
+    STUCK = 0
+    ADDED = 1
+    FORCED = 2
+
+
+FAULT_ROWS = len(ReadingFault)
 
 
 @dataclasses.dataclass
@@ -143,6 +159,8 @@ def read_sensors(
     estimate: NDArray[np.float64],
     pressure: NDArray[np.float64],
     memory: NDArray[np.float64],
+    faults: NDArray[np.float64] | None = None,
+    raw: NDArray[np.float64] | None = None,
 ) -> None:
     """Takes one sample of n joints, in place.
 
@@ -161,6 +179,10 @@ def read_sensors(
         pressure: (2n) readings, Pa; set.
         memory: See `memory_size`; advanced. Where its first entry is 0 the
             filters rest at the first reading, with no speed.
+        faults: (FAULT_ROWS · 3n) what is wrong, see `ReadingFault`; None:
+            nothing.
+        raw: (3n) readings before the filter, kept where one is stuck;
+            advanced. It goes with `faults`.
     """
     n = true_state.size // 2
     order = coefficients.shape[1] - 1
@@ -172,6 +194,14 @@ def read_sensors(
         step = scales[1, c]
         if step > 0.0:
             reading = step * np.rint(reading / step)
+        if faults is not None and raw is not None:
+            forced = faults[6 * n + c]
+            reading += faults[3 * n + c]
+            if not np.isnan(forced):
+                reading = forced
+            if faults[c] > 0.0 and not first:
+                reading = raw[c]
+            raw[c] = reading
         if c >= n:
             pressure[c - n] = reading
             continue

@@ -106,6 +106,11 @@ def content_of(scenario: Scenario) -> tuple[Content, list[Path]]:
     values = config_values(scenario)
     for field in _LEARNING:
         del values[field]
+    # A scenario without them is what it was before there were any.
+    if not scenario.faults:
+        del values["faults"]
+    if not scenario.supervisor.enabled:
+        del values["supervisor"]
     names = [leaf for leaf in leaves(values) if is_file_name(leaf)]
     plain = map_leaves(
         values, lambda leaf: "file" if is_file_name(leaf) else leaf

@@ -21,6 +21,7 @@ from drake_affetto.common.fingerprint import config_values
 from drake_affetto.common.resources import models_dir, resolve
 from drake_affetto.common.yaml_config import anchored, read_yaml, typed
 from drake_affetto.control.pidf_controller import PidfConfig
+from drake_affetto.faults.config import Fault
 from drake_affetto.motion.dmp_config import DmpConfig
 from drake_affetto.perception.blob import BlobConfig
 from drake_affetto.perception.config import (
@@ -41,7 +42,9 @@ from drake_affetto.station.drake_config import (
     check_simulator_config,
 )
 from drake_affetto.station.drum_region import DrumRegion
+from drake_affetto.station.fault_wiring import check_faults
 from drake_affetto.station.model_check import check_models_once
+from drake_affetto.station.supervision import SupervisionConfig
 from drake_affetto.station.variation import VariationConfig
 from drake_affetto.teaching.stroke import TeacherConfig
 
@@ -183,6 +186,8 @@ class Scenario:
             does; see `variation`.
         sound: YAML file of the drum's voice and of the reward.
         teaching: see `teaching`.
+        faults: of the robot and its surroundings in every trial; see `faults`.
+        supervisor: who notices them; see `supervision`.
         motion_source: "skill": the robot looks, and moves as its skill says.
             "external": `affetto.desired_state` is an input of the station.
         valve_source: "pidf": the valves are controlled (Eq. 7). "external":
@@ -238,6 +243,10 @@ class Scenario:
     )
     sound: str = file_name("package://drake_affetto/sound.yaml")
     teaching: TeacherConfig = dataclasses.field(default_factory=TeacherConfig)
+    faults: list[Fault] = dataclasses.field(default_factory=list)
+    supervisor: SupervisionConfig = dataclasses.field(
+        default_factory=SupervisionConfig
+    )
     motion_source: str = "skill"
     valve_source: str = "pidf"
     wire: str = file_name("")
@@ -293,6 +302,7 @@ class Scenario:
             part: Any = getattr(self, field.name)
             if hasattr(part, "check"):
                 part.check(f"{where}.{field.name}")
+        check_faults(self, where)
         require(
             bool(self.drum_region.contains(self.world.drum_position)),
             f"{where}.world.drum_position",

@@ -55,6 +55,7 @@ from drake_affetto.scene.joints import JointSelection
 from drake_affetto.sensing.joint_sensors import JointSensors
 from drake_affetto.skill.policy import SkillPolicy
 from drake_affetto.sound.microphone import DrumMicrophone
+from drake_affetto.station.fault_wiring import FaultWiring, wants_faults
 from drake_affetto.station.gaze_turn import add_gaze_turn
 from drake_affetto.station.model_check import check_scene
 from drake_affetto.station.scenario import Scenario
@@ -193,6 +194,13 @@ class AffettoStation(Diagram):
         self._add_hearing(builder)
         desired = self._add_motion(builder)
         self._add_control(builder, desired)
+        if self.faults is not None:
+            self.faults.add_supervisor(
+                desired,
+                self.policy,
+                self.gaze,
+                self.blob_sensor.get_blob_pixels_output_port(),
+            )
         if meshcat is not None:
             MeshcatVisualizer.AddToBuilder(
                 builder,
@@ -369,6 +377,18 @@ class AffettoStation(Diagram):
         controlled = scenario.valve_source == "pidf"
         self.sensors: JointSensors | None = None
 
+        self.faults: FaultWiring | None = None
+        if wants_faults(scenario):
+            self.faults = FaultWiring(
+                scenario,
+                builder,
+                self.plant,
+                self.scene_graph,
+                self._robot,
+                self._actuators(),
+                self._variation.sensors,
+            )
+
         def sense(
             joints: JointSelection,
             state: OutputPort,
@@ -386,13 +406,14 @@ class AffettoStation(Diagram):
                 # With the actuators' update: the joints are by then those of
                 # the tick, the pressures those of one step before.
                 lead=0.5 * scenario.plant_config.time_step,
+                faulty=self.faults is not None,
             )
             return (
                 self.sensors.get_estimated_state_output_port(),
                 self.sensors.get_chamber_pressure_output_port(),
             )
 
-        return AddPneumaticDriver(
+        systems = AddPneumaticDriver(
             PneumaticDriver(
                 joints={
                     name: JointActuator() for name in scenario.active_joints
@@ -405,7 +426,12 @@ class AffettoStation(Diagram):
             builder,
             sense if scenario.variation.enabled else None,
             longest_delay=self._variation.actuators.longest_delay,
+            carry=None if self.faults is None else self.faults.carry,
         )
+        if self.faults is not None:
+            assert self.sensors is not None
+            self.faults.add_body(systems, self.sensors)
+        return systems
 
     def _actuators(self) -> PneumaticActuationConfig:
         """Actuators and air supply as the robot's body has them."""
@@ -467,6 +493,12 @@ class AffettoStation(Diagram):
             mirrors=self.scenario.mirrors,
             render_config=self.scenario.rendering,
         )
+        image = self.camera.get_color_image_output_port()
+        if self.faults is not None:
+            radius = world.find_marker_radius(
+                self.plant, seen.model_inspector()
+            )
+            image = self.faults.add_camera(self.camera, radius)
         self.blob_sensor: BlobSensor | AnalyticBlobSensor
         if self.scenario.camera.renderer == "analytic":
             self.blob_sensor = AnalyticBlobSensor.AddToBuilder(
@@ -482,13 +514,13 @@ class AffettoStation(Diagram):
         else:
             self.blob_sensor = BlobSensor.AddToBuilder(
                 builder=builder,
-                color_image=self.camera.get_color_image_output_port(),
+                color_image=image,
                 config=self.scenario.blob,
             )
+        builder.ExportOutput(image, "camera.color_image")
         export(
             builder,
             "camera",
-            self.camera.get_color_image_output_port(),
             self.camera.get_label_image_output_port(),
             self.blob_sensor.get_blob_output_port(),
             self.blob_sensor.get_blob_pixels_output_port(),

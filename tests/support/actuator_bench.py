@@ -76,6 +76,9 @@ class Actuators:
         self.torque = np.zeros(self.n)
         self.mass_flow = np.zeros(2 * self.n)
         self.memory = np.zeros(memory_size(self.n, h, max_dead_time))
+        # What is wrong, and what is above the command, if anything.
+        self.conditions = None
+        self.action = 0
 
     def step(self, command, q, v=0.0):
         """One step with commands and joint state held."""
@@ -94,5 +97,8 @@ class Actuators:
             self.torque,
             self.mass_flow,
             self.memory,
+            0.0,
+            self.action,
+            self.conditions,
         )
         return self.pressure.copy()

@@ -10,6 +10,8 @@ import time
 
 import numpy as np
 
+from drake_affetto.faults.supervision import CHECKS
+
 VIEWS = {
     "drumming": (np.array([[6.0, 0.5], [-0.5, 4.0]]), np.array([-1.1, 0.4])),
     "mirror": (np.array([[-0.5, 4.0], [5.0, 1.0]]), np.array([0.7, -0.8])),
@@ -50,6 +52,8 @@ def run(spec):
             "prototype": np.full((4, 5), 0.5),
         }
         return result, arrays
+    if spec["kind"] == "watched":
+        return _watched(spec, seen, rng)
     assert spec["kind"] == "strike"
     miss = np.linalg.norm(spec["theta"][:2] - xy)
     reward = float(max(0.0, 1.0 - 0.85 * miss / REACH))
@@ -63,6 +67,27 @@ def run(spec):
     }
     course = np.linspace(0.0, reward, 7, dtype=np.float32)
     return result, {"reward_over_time": course}
+
+
+def _watched(spec, seen, rng):
+    """A trial with faults: the larger, the more surely it is noticed."""
+    size = max((fault["size"] for fault in spec["faults"]), default=0.0)
+    noticed = bool(rng.uniform() < size)
+    result = {
+        "found": True,
+        "tau": seen.tolist(),
+        "reward": 0.0 if size == 0.3 else 0.6,
+        "heard": size != 0.3,
+        "invalid": "angle reading jumps (elbow)" if noticed else "",
+        "detected_at": 2.5 if noticed else None,
+        "onset": 2.0 if spec["faults"] else None,
+        "movement_at": 3.0,
+        # Someone else's drum.
+        "impulse": 0.0 if size == 0.2 else 1.0,
+        "max_force": 50.0 if size == 1.0 else 5.0,
+        "max_speed": 2.0,
+    }
+    return result, {"scores": np.full(CHECKS, 0.5, dtype=np.float32)}
 
 
 def note(spec) -> None:

@@ -24,6 +24,11 @@ from drake_affetto.experiments.results.drumming import (
     SimilarityTraces,
     TaughtPosition,
 )
+from drake_affetto.experiments.results.faults import (
+    FaultRow,
+    FaultsResults,
+    SoundTrials,
+)
 from drake_affetto.experiments.results.mirror import (
     ConditionRow,
     ConditionsResults,
@@ -52,6 +57,7 @@ from drake_affetto.experiments.results.trial import (
     GazeResult,
     HandLookResult,
     StrikeResult,
+    WatchedResult,
 )
 
 __all__ = [
@@ -70,6 +76,8 @@ __all__ = [
     "DrummingResult",
     "EllipseLookResult",
     "EvaluatedPosition",
+    "FaultRow",
+    "FaultsResults",
     "FinalTest",
     "GazeResult",
     "HandLookResult",
@@ -81,6 +89,7 @@ __all__ = [
     "SchemeCell",
     "SchemeComparisonRow",
     "SimilarityTraces",
+    "SoundTrials",
     "SourceErrors",
     "StrikeResult",
     "SuccessRate",
@@ -92,5 +101,6 @@ __all__ = [
     "ToySource",
     "TransferErrors",
     "TransferMap",
+    "WatchedResult",
     "read_study",
 ]

@@ -6,6 +6,7 @@ from drake_affetto.common.study_results import StudyResults
 from drake_affetto.common.typed_json import from_plain
 from drake_affetto.experiments.results.demo import DemoResults
 from drake_affetto.experiments.results.drumming import DrumResults
+from drake_affetto.experiments.results.faults import FaultsResults
 from drake_affetto.experiments.results.mirror import (
     ConditionsResults,
     MirrorResults,
@@ -22,6 +23,7 @@ STUDY_RESULTS: dict[str, type[StudyResults]] = {
         ScenariosResults,
         ConditionsResults,
         ToyResults,
+        FaultsResults,
     )
 }
 

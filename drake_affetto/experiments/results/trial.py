@@ -155,6 +155,45 @@ class EllipseLookResult:
     moments: list[float] | None
 
 
+@dataclasses.dataclass(frozen=True)
+class WatchedResult:
+    """The whole chain with faults, watched by the supervisor.
+
+    Times are since the trial's beginning, when the robot rests.
+
+    Attributes:
+        found: Whether the gaze settled on the marker.
+        tau: Task parameter τ (2,).
+        reward: Reward from the sound; 0 without a movement.
+        heard: Whether it is above the threshold.
+        invalid: Why the supervisor does not pass the trial; empty: it does.
+        detected_at: When it said so, s; None: never.
+        onset: When the first fault began, s; None: none did.
+        movement_at: When the movement began, s; None: none did.
+        max_force: Greatest force on the drum or the table, N.
+        impulse: Impulse on the drum's head, N s.
+        max_speed: Greatest speed of a joint, rad/s.
+        scores: (checks,) greatest score of each check, see
+            `faults.supervision`.
+    """
+
+    KIND: ClassVar[str] = "watched"
+    ARRAYS: ClassVar[dict[str, int]] = {"scores": 1}
+
+    found: bool
+    tau: list[float] = field(metadata=TAU)
+    reward: float = field(metadata=REWARD)
+    heard: bool
+    invalid: str
+    detected_at: float | None
+    onset: float | None
+    movement_at: float | None
+    max_force: float = field(metadata=NOT_NEGATIVE)
+    impulse: float = field(metadata=NOT_NEGATIVE)
+    max_speed: float = field(metadata=NOT_NEGATIVE)
+    scores: np.ndarray
+
+
 TrialResult = (
     GazeResult
     | DemonstrationResult
@@ -162,6 +201,7 @@ TrialResult = (
     | DrummingResult
     | HandLookResult
     | EllipseLookResult
+    | WatchedResult
 )
 
 TRIAL_RESULTS: dict[str, Any] = {
@@ -173,6 +213,7 @@ TRIAL_RESULTS: dict[str, Any] = {
         DrummingResult,
         HandLookResult,
         EllipseLookResult,
+        WatchedResult,
     )
 }
 

@@ -1,0 +1,113 @@
+"""The whole chain with faults: what happens, and what is noticed."""
+
+import numpy as np
+import pytest
+
+from drake_affetto.common.errors import InputError
+from drake_affetto.experiments.fault_injection import FaultInjection
+from drake_affetto.experiments.trials import (
+    Movement,
+    demonstration,
+    run_trial,
+    runner,
+    watched,
+)
+from drake_affetto.faults.config import Fault
+from drake_affetto.faults.supervision import CHECKS
+
+XY, SEED = [0.25, -0.1], 9
+
+
+@pytest.fixture(scope="module")
+def lesson():
+    taught = run_trial(demonstration("drumming", XY, 5))
+    assert taught.success
+    return Movement(taught.theta), np.stack([taught.prototype])
+
+
+@pytest.fixture(scope="module")
+def trial(lesson):
+    def run(*faults, xy=XY):
+        return run_trial(watched("supervised", xy, SEED, *lesson, faults))
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def sound(trial):
+    return trial()
+
+
+def test_a_sound_trial_is_valid_and_heard(sound):
+    assert (sound.invalid, sound.heard) == ("", True)
+    assert sound.detected_at is sound.onset is None
+    assert sound.impulse > 0.01
+    assert 0.0 < sound.max_force < 40.0
+    assert sound.scores.shape == (CHECKS,)
+    assert sound.scores.max() < 1.0
+
+
+def test_a_fault_that_never_comes_changes_nothing(sound, trial):
+    late = trial(Fault(kind="supply_lost", onset=1e3))
+    assert late.onset == 1e3
+    assert late.reward == sound.reward
+    assert np.array_equal(late.scores, sound.scores)
+    # Nor does one of the trial before, which is over.
+    assert trial().reward == sound.reward
+
+
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [
+        (
+            Fault(
+                kind="joint_stuck", joint="right_shoulder_flexion", onset=0.5
+            ),
+            "angle reading does not change (right_shoulder_flexion)",
+        ),
+        (Fault(kind="camera_dark", size=6.0), "image is dark"),
+        (
+            Fault(kind="microphone_dead", since="movement"),
+            "microphone is silent",
+        ),
+        (
+            Fault(kind="hand_lost", since="movement"),
+            "the hand was on the drum and nothing is heard",
+        ),
+    ],
+)
+def test_faults_are_noticed_for_what_they_are(trial, fault, reason):
+    found = trial(fault)
+    assert found.invalid == reason
+    assert found.detected_at >= found.onset
+    if fault.kind == "hand_lost":
+        assert found.impulse == 0.0
+
+
+def test_a_drum_that_is_moved_away_is_seen_elsewhere(trial):
+    found = trial(Fault(kind="drum_moved", size=0.12, since="movement"))
+    assert not found.heard
+    assert found.invalid in (
+        "drum is seen elsewhere afterwards",
+        "the hand was on the drum and nothing is heard",
+    )
+
+
+def test_someone_elses_drum_is_no_success(trial):
+    # The hand comes down where no drum is.
+    moved = Fault(kind="drum_moved", size=0.12, since="movement")
+    other = Fault(kind="other_drum", since="movement")
+    found = trial(moved, other)
+    assert found.impulse == 0.0
+    assert found.heard
+    assert found.invalid
+
+
+def test_it_needs_a_supervisor_and_faults_that_fit(lesson):
+    with pytest.raises(InputError, match=r"supervisor\.enabled is"):
+        run_trial(watched("drumming", XY, SEED, *lesson))
+    assert runner("drumming").injection is None
+    fault = Fault(kind="joint_stuck", joint="tail")
+    with pytest.raises(InputError, match=r"faults\[0\]\.joint is 'tail'"):
+        run_trial(watched("supervised", XY, SEED, *lesson, [fault]))
+    assert isinstance(runner("supervised").injection, FaultInjection)
