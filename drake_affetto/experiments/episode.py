@@ -622,7 +622,11 @@ class TrialRunner:
         return Verdict() if self.injection is None else self.injection.verdict
 
     def log(self, name: str) -> tuple[Array, Array]:
-        """Times (T,) and values (T, size) of a log, each time once."""
+        """Times (T,) and values (T, size) of a log, each time once.
+
+        Args:
+            name: Name of the log.
+        """
         log = self._logs[name].FindLog(self.context)
         t = log.sample_times()
         keep = np.append(np.diff(t) > 1e-9, True)

@@ -150,6 +150,7 @@ class JointSensors(LeafSystem):
             joint_names: Names of the n joints.
             period: Time between two samples, s.
             lead: Time by which a sample is taken early, s.
+            faulty: Whether the sensors have inputs for faults.
         """
         sensors = JointSensors(
             parameters,
