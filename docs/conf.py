@@ -102,6 +102,7 @@ sphinx_gallery_conf = {
     "run_stale_examples": _changed,
     "abort_on_example_error": True,
     "reset_argv": "gallery.reset_argv",
+    "default_thumb_file": str(HERE / "affetto.png"),
     "copyfile_regex": r".*\.yaml$",
     "image_scrapers": ("matplotlib", gallery.SavedFigures(_out / "tutorials")),
     "first_notebook_cell": gallery.FIRST_CELL.format(arguments="[]"),
@@ -114,7 +115,7 @@ sphinx_gallery_conf = {
     "min_reported_time": 1,
     "nested_sections": True,
 }
-suppress_warnings = ["config.cache", "toc.excluded"]
+suppress_warnings = ["config.cache"]
 
 
 def _remember(app, error):

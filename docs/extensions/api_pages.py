@@ -189,7 +189,17 @@ def complete_docstring(
         return
     if "".join(lines).strip() == docstring_check.OF_BASE:
         lines[:] = base_docstring(obj).splitlines()
-    told = docstring_check.common_entries(obj, "\n".join(lines))
+    text = "\n".join(lines)
+    if what == "class":
+        # Its own docstring comes first, then that of `__init__`, if any.
+        own, init = (
+            inspect.cleandoc(getattr(each, "__doc__", None) or "")
+            for each in (obj, vars(obj).get("__init__"))
+        )
+        if init and text.strip() != init:
+            return
+        text = f"{own}\n\n{init}"
+    told = docstring_check.common_entries(obj, text)
     if not told:
         return
     added = [f"    {key}: {text}" for key, text in told.items()]
