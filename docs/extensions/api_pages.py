@@ -6,6 +6,7 @@ gives a table of the names and then an entry for each. What has no text, see
 `docstring_check`, is a warning.
 """
 
+import ast
 from collections.abc import Iterator
 import dataclasses
 import importlib
@@ -20,6 +21,7 @@ from docutils.parsers.rst import directives
 from pydrake.systems.scalar_conversion import TemplateSystem
 import pydrake_system
 from sphinx.application import Sphinx
+from sphinx.pycode import ModuleAnalyzer
 from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
 
@@ -81,6 +83,23 @@ def summary(value: Any) -> str:
     return first_sentence(value.__doc__ or "")
 
 
+def constant_text(face: str, name: str) -> list[str]:
+    """What is said of a constant beside it, as `#:` or as a string below it."""
+    text = Path(str(importlib.import_module(face).__file__)).read_text()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.ImportFrom) and name in {
+            alias.name for alias in node.names
+        }:
+            found = ModuleAnalyzer.for_module(str(node.module))
+            return found.find_attr_docs().get(("", name), [])
+    return []
+
+
+def is_constant(value: Any) -> bool:
+    """Whether a public name is neither a class, a function nor a template."""
+    return not (callable(value) or isinstance(value, TemplateSystem))
+
+
 def entry(face: str, name: str, value: Any) -> Iterator[str]:
     """The lines of reStructuredText that document a name."""
     if isinstance(value, TemplateSystem):
@@ -101,7 +120,9 @@ def entry(face: str, name: str, value: Any) -> Iterator[str]:
     elif callable(value):
         yield f".. autofunction:: {face}.{name}"
     else:
-        yield f".. autodata:: {face}.{name}"
+        yield f".. py:data:: {face}.{name}"
+        yield ""
+        yield from (f"   {line}" for line in constant_text(face, name))
     yield ""
 
 
@@ -140,6 +161,13 @@ class Face(SphinxDirective):
     def _complain(self, name: str, value: Any) -> None:
         """Warns of what has no text."""
         if isinstance(value, TemplateSystem):
+            return
+        if is_constant(value):
+            face, _, own = name.rpartition(".")
+            if not constant_text(face, own):
+                logger.warning(
+                    "%s has no text", name, location=self.get_location()
+                )
             return
         for finding in docstring_check.check(name, value):
             logger.warning("%s", finding, location=self.get_location())
