@@ -6,6 +6,7 @@ AFFETTO_DOCS_TUTORIALS  names of the tutorials that are run, by commas (all);
 
 import os
 from pathlib import Path
+import shutil
 import sys
 
 os.environ.setdefault("MPLBACKEND", "Agg")
@@ -89,17 +90,19 @@ _scripts = _out / "tutorials"
 _only = os.environ.get("AFFETTO_DOCS_TUTORIALS")
 gallery.prepare(_scripts)
 
-# A tutorial is run again if it, or the package, has changed.
+# A tutorial is run again if it, or the package, has changed. The gallery keeps
+# what has been run, so that a build that was interrupted goes on from there.
 _stamp = _out / "content"
 _content = gallery.content_of_package()
-_changed = not _stamp.is_file() or _stamp.read_text() != _content
+if not _stamp.is_file() or _stamp.read_text() != _content:
+    shutil.rmtree(HERE / "tutorials", ignore_errors=True)
+    _stamp.write_text(_content)
 
 sphinx_gallery_conf = {
     "examples_dirs": str(_scripts),
     "gallery_dirs": "tutorials",
     "filename_pattern": gallery.pattern(_only),
     "ignore_pattern": r"__init__\.py",
-    "run_stale_examples": _changed,
     "abort_on_example_error": True,
     "reset_argv": "gallery.reset_argv",
     "default_thumb_file": str(HERE / "affetto.png"),
@@ -116,15 +119,3 @@ sphinx_gallery_conf = {
     "nested_sections": True,
 }
 suppress_warnings = ["config.cache"]
-
-
-def _remember(app, error):
-    """Notes for which package the tutorials were run, once all were."""
-    if error is None:
-        _stamp.parent.mkdir(parents=True, exist_ok=True)
-        _stamp.write_text(_content)
-
-
-def setup(app):
-    """Connects what is not worth an extension."""
-    app.connect("build-finished", _remember)

@@ -27,6 +27,11 @@ from sphinx.util.docutils import SphinxDirective
 
 logger = logging.getLogger(__name__)
 
+# A shape or unit of one letter, as in "q: (n), rad" or "s.", is no item of a
+# list.
+_LIKE_AN_ITEM = re.compile(
+    r"^(\s*(?:\*{0,2}\w+: )?)(\([A-Za-z]\)|[A-Za-z]\.)(?=[\s,.]|$)"
+)
 # What Drake's templates and scikit-learn add to a class of ours.
 _FOREIGN = re.compile(
     r"Do[A-Z]|ToScalarType|ToAutoDiffXd|ToSymbolic|set_\w+_request$"
@@ -212,6 +217,8 @@ def complete_docstring(
 
     Runs before napoleon, on the Google style.
     """
+    for row, line in enumerate(lines):
+        lines[row] = _LIKE_AN_ITEM.sub(r"\1\\\2", line)
     fit = what in ("method", "function", "class")
     if not fit or dataclasses.is_dataclass(obj):
         return
