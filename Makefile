@@ -16,7 +16,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test quick rooms lint format bench clean distclean
+.PHONY: help setup demo test quick docs rooms lint format bench clean distclean
 
 help:
 	@echo "make demo       run the main job into out/demo"
@@ -26,6 +26,7 @@ help:
 	@echo "make lint       ruff's rules and layout, and the types"
 	@echo "make format     lay out the code and mend what ruff can mend"
 	@echo "make bench      measure the speed of the closed loop"
+	@echo "make docs       build the documentation into out/docs, without network"
 	@echo "make rooms      draw the package's rooms and imports into docs/"
 	@echo "make clean      remove what was built, not .venv and not out/"
 	@echo "make distclean  remove .venv and out/ too"
@@ -55,6 +56,12 @@ quick: setup
 	    $(PYTHON) -m pytest -n $(WORKERS) --dist loadfile \
 	    -m "not slow" $(ARGS)
 
+# Warnings are errors. Tutorials are run, where they or the package changed.
+docs: setup
+	@$(PYTHON) -m sphinx -W --keep-going -b html -d out/docs-work/doctrees \
+	    docs out/docs $(ARGS)
+	@echo "docs: out/docs/index.html"
+
 rooms: setup
 	@$(PYTHON) tools/draw_rooms.py $(ARGS)
 
@@ -63,7 +70,7 @@ bench: setup
 
 clean:
 	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
-	rm -rf .hypothesis .coverage
+	rm -rf .hypothesis .coverage docs/tutorials docs/api/rooms
 	find . -path './.*' -prune -o -name __pycache__ -type d \
 	    -exec rm -rf {} +
 

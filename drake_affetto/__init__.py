@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from drake_affetto.station.scenario import Scenario, load_scenario
     from drake_affetto.station.station import AffettoStation
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __getattr__, __dir__, __all__ = attach(
     __name__,

@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+import re
 import subprocess
 import sys
 import tomllib
@@ -145,3 +146,25 @@ def test_pins_hold_everything_that_the_project_asks_for():
             assert len(fit) == 1, f"{text} on Python {version}: {fit}"
             (specifier,) = fit[0].specifier
             assert wanted.specifier.contains(specifier.version), text
+
+
+def test_version_is_the_same_everywhere():
+    import drake_affetto
+
+    version = drake_affetto.__version__
+    citation = (ROOT / "CITATION.cff").read_text()
+    assert f"\nversion: {version}\n" in citation
+    changes = re.findall(
+        r"^## \[([^]]+)\] - (\S+)$", (ROOT / "CHANGELOG.md").read_text(), re.M
+    )
+    released = dict(changes)
+    assert changes[0][0] == version
+    assert f"\ndate-released: {released[version]}\n" in citation
+
+
+def test_development_has_what_the_extras_have():
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"][
+        "optional-dependencies"
+    ]
+    for name in ("dask", "data", "docs", "gym"):
+        assert set(extras[name]) <= set(extras["dev"]), name

@@ -20,7 +20,7 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
 import drake_affetto.envs  # noqa: F401  (registers the environments)
 
-parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("--out", default="out/learn", help="folder for the curve")
 parser.add_argument("--episodes", type=int, default=200)
 parser.add_argument("--tests", type=int, default=30, help="places of a test")

@@ -25,7 +25,7 @@ from drake_affetto.sound.voice import DrumVoice
 from drake_affetto.station.scenario import load_scenario
 from drake_affetto.station.station import AffettoStation
 
-argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
+argparse.ArgumentParser(description=__doc__).parse_args()
 scenario = load_scenario("drumming")
 drum_xy = np.array([0.23, -0.09])  # where the drum stands, m
 

@@ -28,7 +28,7 @@ from drake_affetto.skill import (
     make_scheme,
 )
 
-parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("--out", default="out/tutorial_transfer", metavar="DIR")
 out = prepare_output(parser.parse_args().out)
 random = np.random.default_rng(4)

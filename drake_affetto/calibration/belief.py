@@ -83,7 +83,13 @@ class PlaneBelief:
         config: EarConfig,
         rng: np.random.Generator,
     ) -> "PlaneBelief":
-        """The belief of a robot that has not looked yet."""
+        """The belief of a robot that has not looked yet.
+
+        Args:
+            knowledge: The robot's model of itself.
+            prior: Where a mirror may stand.
+            workspace: Corners (k, 2) of where drums stand, m.
+        """
         planes = prior.draw(config.particles, rng)
         return cls(knowledge, planes, workspace, config, rng)
 
@@ -96,7 +102,13 @@ class PlaneBelief:
         config: EarConfig,
         rng: np.random.Generator,
     ) -> "PlaneBelief":
-        """The belief after a calibration, with the covariance it states."""
+        """The belief after a calibration, with the covariance it states.
+
+        Args:
+            knowledge: The robot's model of itself.
+            estimate: Plane and covariance of the calibration.
+            workspace: Corners (k, 2) of where drums stand, m.
+        """
         told = estimate.from_point(knowledge.eye_position)
         planes = told.draw(config.particles, rng)
         return cls(knowledge, planes, workspace, config, rng)
@@ -115,12 +127,19 @@ class PlaneBelief:
         """Where the drum seen at τ̂ (2,) is by each plane: (N, 2), m.
 
         NaN by planes in which it would be seen nowhere on the table.
+
+        Args:
+            tau: Where the drum is seen in the image (2,).
         """
         pixel = self.knowledge.calibration.pixels(np.asarray(tau))
         return self.knowledge.places(self.planes, self._reference, pixel)
 
     def plausible(self, tau: Array) -> float:
-        """Probability that the drum seen at τ̂ (2,) is in the workspace."""
+        """Probability that the drum seen at τ̂ (2,) is in the workspace.
+
+        Args:
+            tau: Where the drum is seen in the image (2,).
+        """
         return float(self.weights @ self._inside(tau))
 
     def _inside(self, tau: Array) -> Mask:
@@ -131,7 +150,11 @@ class PlaneBelief:
         return inside
 
     def see(self, tau: Array) -> None:
-        """Takes in that a drum is seen at τ̂ (2,): it is in the workspace."""
+        """Takes in that a drum is seen at τ̂ (2,): it is in the workspace.
+
+        Args:
+            tau: Where the drum is seen in the image (2,).
+        """
         inside = self._inside(tau)
         self._weigh(np.where(inside, 1.0, self._config.stray))
 
@@ -163,7 +186,13 @@ class PlaneBelief:
         raise ValueError("no place of the workspace is seen directly")
 
     def hear(self, tau: Array, stroke: Stroke, heard: bool) -> None:
-        """Takes in whether a stroke at the drum seen at τ̂ (2,) was heard."""
+        """Takes in whether a stroke at the drum seen at τ̂ (2,) was heard.
+
+        Args:
+            tau: Where the drum was seen in the image (2,).
+            stroke: The stroke.
+            heard: Whether the drum sounded.
+        """
         chance = self._heard(stroke.place[None], self.places(tau))[0]
         self._weigh(chance if heard else 1.0 - chance)
 

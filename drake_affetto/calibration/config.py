@@ -221,6 +221,9 @@ def load_self_calibration(
 ) -> SelfCalibrationConfig:
     """Reads and checks a file of these settings.
 
+    Args:
+        uri: The file, or its package:// URI.
+
     Raises:
         InputError: for a missing or malformed file, an unknown field or a
             value out of range.

@@ -52,7 +52,11 @@ class KnowledgeErrors:
         check_ranges(self, where)
 
     def deviation(self, joints: int) -> Array:
-        """(10 + joints,), of each number of a correction."""
+        """(10 + joints,), of each number of a correction.
+
+        Args:
+            joints: Number of joints whose offsets are corrected.
+        """
         return np.array(
             3 * [self.camera_angle]
             + 3 * [self.camera_position]
@@ -62,7 +66,11 @@ class KnowledgeErrors:
         )
 
     def draw(self, joints: int, rng: np.random.Generator) -> Array:
-        """A correction (10 + joints,), normal within two deviations."""
+        """A correction (10 + joints,), normal within two deviations.
+
+        Args:
+            joints: Number of joints whose offsets are corrected.
+        """
         deviation = self.deviation(joints)
         drawn = rng.standard_normal(len(deviation))
         return deviation * np.clip(drawn, -2.0, 2.0)
@@ -112,7 +120,12 @@ class RobotKnowledge:
         return _JOINTS + len(self.joints)
 
     def corrected(self, correction: Array) -> "RobotKnowledge":
-        """The model with a correction (10 + n,) applied to it."""
+        """The model with a correction (10 + n,) applied to it.
+
+        Args:
+            correction: Of camera, hand and joints, as `KnowledgeErrors.draw`
+                gives it.
+        """
         if not np.any(correction):
             return self
         X_CC = make_pose(
@@ -136,11 +149,19 @@ class RobotKnowledge:
         )
 
     def eye(self, readings: Array) -> Array:
-        """X_WC (..., 4, 4) at readings (..., n)."""
+        """X_WC (..., 4, 4) at readings (..., n).
+
+        Args:
+            readings: Angles of the n joints as they are read (..., n), rad.
+        """
         return self._pose(self.eye_chain, readings)
 
     def hand(self, readings: Array) -> Array:
-        """p_W (..., 3) of the hand's marker at readings (..., n)."""
+        """p_W (..., 3) of the hand's marker at readings (..., n).
+
+        Args:
+            readings: Angles of the n joints as they are read (..., n), rad.
+        """
         return self._pose(self.hand_chain, readings)[..., :3, 3]
 
     def pixels(self, X_WC: Array, p_W: Array) -> Array:

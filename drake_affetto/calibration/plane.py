@@ -55,13 +55,21 @@ class PlanePrior:
         return np.array([self.azimuth_sd, self.elevation_sd, self.distance_sd])
 
     def draw(self, count: int, rng: np.random.Generator) -> Array:
-        """Planes (count, 3); none of them is behind the camera."""
+        """Planes (count, 3); none of them is behind the camera.
+
+        Args:
+            count: Number of planes.
+        """
         drawn = self.mean + self.deviation * rng.standard_normal((count, 3))
         drawn[:, 2] = np.maximum(np.abs(drawn[:, 2]), 0.05)
         return drawn
 
     def residuals(self, parameters: Array) -> Array:
-        """How far planes (..., 3) are off the mean, in deviations."""
+        """How far planes (..., 3) are off the mean, in deviations.
+
+        Args:
+            parameters: Three numbers of each plane (..., 3).
+        """
         return (parameters - self.mean) / self.deviation
 
 
@@ -92,7 +100,11 @@ class PlaneEstimate:
         return float(np.sqrt(self.covariance[2, 2]))
 
     def from_point(self, reference: Array) -> "PlaneEstimate":
-        """The same, told from another reference point (3,)."""
+        """The same, told from another reference point (3,).
+
+        Args:
+            reference: Point of reference (3,), m.
+        """
         by = reference - self.reference
         J = np.eye(3)
         J[2, :2] = by @ normal_slopes(self.parameters)
@@ -103,15 +115,27 @@ class PlaneEstimate:
         )
 
     def draw(self, count: int, rng: np.random.Generator) -> Array:
-        """Planes (count, 3) as they are believed possible."""
+        """Planes (count, 3) as they are believed possible.
+
+        Args:
+            count: Number of planes.
+        """
         return rng.multivariate_normal(self.parameters, self.covariance, count)
 
     def distance2(self, parameters: Array) -> float:
-        """Squared distance of a plane (3,) in deviations (Mahalanobis)."""
+        """Squared distance of a plane (3,) in deviations (Mahalanobis).
+
+        Args:
+            parameters: The plane's three numbers.
+        """
         off = np.asarray(parameters) - self.parameters
         off[0] = (off[0] + np.pi) % (2 * np.pi) - np.pi
         return float(off @ np.linalg.solve(self.covariance, off))
 
     def covers(self, parameters: Array) -> bool:
-        """Whether a plane (3,) is in the region of 95 %."""
+        """Whether a plane (3,) is in the region of 95 %.
+
+        Args:
+            parameters: The plane's three numbers.
+        """
         return self.distance2(parameters) <= CHI2_95

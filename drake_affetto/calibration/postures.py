@@ -232,6 +232,11 @@ class HandCalibration:
     ) -> None:
         """See `PostureChooser`.
 
+        Args:
+            knowledge: The robot's model of itself, before it has looked.
+            errors: How wrong that model may be.
+            prior: Where a mirror may stand.
+
         Raises:
             CalibrationFailure: If no posture keeps the hand in the box.
         """
@@ -264,7 +269,12 @@ class HandCalibration:
         return self._chooser.next(self.looks)
 
     def add(self, look: HandLook) -> None:
-        """Takes in a look."""
+        """Takes in a look.
+
+        Args:
+            look: Readings of the joints, and the pixel of the marker, if it was
+                seen.
+        """
         self.looks.append(look)
         self._outcome = None
 

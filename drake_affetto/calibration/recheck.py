@@ -65,7 +65,12 @@ class HandRecheck:
         return self._postures[self.looks % len(self._postures)]
 
     def add(self, look: HandLook) -> None:
-        """Takes in a look."""
+        """Takes in a look.
+
+        Args:
+            look: Readings of the joints, and the pixel of the marker, if it was
+                seen.
+        """
         self._votes.append(self._off(look) > self._config.recheck_limit)
 
     def _off(self, look: HandLook) -> float:

@@ -6,11 +6,7 @@ from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Any
 
-from drake_affetto.cli.options import (
-    add_renamed_flag,
-    make_plan,
-    real_number,
-)
+from drake_affetto.cli.options import make_plan, real_number
 from drake_affetto.cli.study_command import Call, StudyCommand, rate_text
 from drake_affetto.common.errors import require
 from drake_affetto.common.fields import option_name
@@ -77,11 +73,10 @@ class MirrorCommand(StudyCommand[MirrorPlan]):
             default=SelfCalibrationPlan.settings,
             help="YAML file of the self-calibration's settings",
         )
-        add_renamed_flag(
-            parser,
+        parser.add_argument(
             "--no-media",
-            "--no-exhibits",
-            "do not record a replay, pictures and sounds of a trial",
+            action="store_true",
+            help="do not record a replay, pictures and sounds of a trial",
         )
 
     def make_plan(self, args: argparse.Namespace) -> MirrorPlan:

@@ -78,14 +78,6 @@ def add_plan_arguments(parser: argparse.ArgumentParser, plan: type) -> None:
             default=default,
             **how,
         )
-        for alias in field.metadata["aliases"]:
-            parser.add_argument(
-                f"--{alias}",
-                dest=field.name,
-                help=argparse.SUPPRESS,
-                default=argparse.SUPPRESS,
-                **how,
-            )
 
 
 def _reader(kind: Any) -> Any:
@@ -129,27 +121,6 @@ def add_seed_argument(
     """Declares --seed."""
     parser.add_argument(
         "--seed", type=whole_number, default=0, metavar="N", help=text
-    )
-
-
-def add_renamed_flag(
-    parser: argparse.ArgumentParser, name: str, earlier: str, text: str
-) -> None:
-    """Declares a flag that also works, unseen, by its earlier name.
-
-    Args:
-        parser: Parser of the command.
-        name: Name of the flag, e.g. --mouse.
-        earlier: Its name in version 0.1.0.
-        text: Help of the flag.
-    """
-    parser.add_argument(name, action="store_true", help=text)
-    parser.add_argument(
-        earlier,
-        dest=name.removeprefix("--").replace("-", "_"),
-        action="store_true",
-        default=argparse.SUPPRESS,
-        help=argparse.SUPPRESS,
     )
 
 

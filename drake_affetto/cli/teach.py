@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from drake_affetto.cli.options import add_renamed_flag
 from drake_affetto.cli.study_command import (
     StudyCommand,
     trial_executor,
@@ -35,11 +34,10 @@ class TeachCommand(StudyCommand[TeachPlan]):
             required=True,
             help="HDF5 file of demonstrations; new ones are added to it",
         )
-        add_renamed_flag(
-            parser,
+        parser.add_argument(
             "--mouse",
-            "--by-hand",
-            "you are the teacher: move the hand with the mouse in a browser",
+            action="store_true",
+            help="you are the teacher: move the hand by mouse in a browser",
         )
 
     def work(

@@ -18,7 +18,6 @@ def number(
     help: str = "",
     *,
     metavar: str = "N",
-    aliases: tuple[str, ...] = (),
 ) -> Any:
     """A field that holds a number, or a tuple of numbers, in [low, high].
 
@@ -28,7 +27,6 @@ def number(
         high: Greatest number.
         help: Help of the command's option; without it there is no option.
         metavar: Name of the value in the help.
-        aliases: Earlier names of the option, which go on working.
     """
     return dataclasses.field(
         default=default,
@@ -36,7 +34,6 @@ def number(
             "range": (low, high),
             "help": help,
             "metavar": metavar,
-            "aliases": aliases,
         },
     )
 
@@ -56,12 +53,11 @@ def option(
     help: str,
     *,
     metavar: str | None = None,
-    aliases: tuple[str, ...] = (),
 ) -> Any:
     """A field without a range that is an option of the command."""
     return dataclasses.field(
         default=default,
-        metadata={"help": help, "metavar": metavar, "aliases": aliases},
+        metadata={"help": help, "metavar": metavar},
     )
 
 

@@ -53,7 +53,14 @@ class JointGains:
 
 @dataclasses.dataclass
 class PidfGains:
-    """Gains of `n` joints, arrays (n) in the units of `JointGains`."""
+    """Gains of `n` joints, arrays (n) in the units of `JointGains`.
+
+    Attributes:
+        kP: Pa/rad (n).
+        kI: Pa/(rad s) (n).
+        kD: Pa s/rad (n).
+        kF: Valve opening per pressure difference (n), 1/Pa.
+    """
 
     kP: NDArray[np.float64]
     kI: NDArray[np.float64]
@@ -78,6 +85,9 @@ class PidfGains:
     @classmethod
     def from_array(cls, array: ArrayLike) -> Self:
         """The gains whose rows (4, n) are kP, kI, kD and kF.
+
+        Args:
+            array: Gains (4, n).
 
         Raises:
             InputError: For another shape, or what is no gain.

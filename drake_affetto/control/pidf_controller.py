@@ -96,7 +96,7 @@ class PidfController(LeafSystem):
             gains: gains of the n joints.
             period: of the updates, s.
             integral_limit: greatest part of u from the integral, Pa.
-            difference_limit: greatest |u|, Pa.
+            difference_limit: greatest magnitude of u, Pa.
             integral_deadband: error that is not integrated, rad.
 
         Raises:
@@ -199,6 +199,9 @@ class PidfController(LeafSystem):
 
     def set_gains(self, context: Context, gains: PidfGains) -> None:
         """Changes the gains; the integral is kept where kI stays above 0.
+
+        Args:
+            gains: Gains of all joints.
 
         Raises:
             InputError: for the gains of another number of joints.

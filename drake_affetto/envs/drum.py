@@ -94,6 +94,9 @@ class DrumEnv(gymnasium.Env):
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Puts the drum somewhere and looks at it.
 
+        Args:
+            options: None, or `{"xy": [x, y]}`, where the drum stands, m.
+
         Raises:
             InputError: If the drum cannot be seen there.
         """
@@ -110,6 +113,9 @@ class DrumEnv(gymnasium.Env):
         self, action: np.ndarray
     ) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Strikes; the episode is over then.
+
+        Args:
+            action: The movement (k,), each entry in [-1, 1].
 
         Raises:
             InputError: If the action does not fit, or there was no reset.

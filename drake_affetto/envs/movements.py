@@ -63,6 +63,9 @@ class MovementSpace:
     def theta(self, action: ArrayLike) -> Array:
         """The movement θ (F,) of an action (k,).
 
+        Args:
+            action: Entries in [-1, 1] (k,).
+
         Raises:
             InputError: If the action has another shape, or an entry is no
                 number in [-1, 1].

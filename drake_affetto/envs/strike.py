@@ -142,6 +142,9 @@ class StrikeEnv(gymnasium.Env):
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Puts the drum somewhere, looks at it and comes to rest.
 
+        Args:
+            options: None, or `{"xy": [x, y]}`, where the drum stands, m.
+
         Raises:
             InputError: If the drum cannot be seen there.
         """
@@ -164,6 +167,9 @@ class StrikeEnv(gymnasium.Env):
         self, action: np.ndarray
     ) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Moves for 0.05 s.
+
+        Args:
+            action: Joint targets (n,), each entry in [-1, 1].
 
         Raises:
             InputError: If the action does not fit, or there was no reset.

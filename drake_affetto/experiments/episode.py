@@ -186,7 +186,11 @@ class TrialRunner:
         return self._taps
 
     def spectrogram(self, recording: Recording) -> Array:
-        """(bands, frames) of a recording's sound."""
+        """(bands, frames) of a recording's sound.
+
+        Args:
+            recording: A trial's recording.
+        """
         return spectrogram(
             recording.sound, recording.sound_rate, self.reward_config
         )
@@ -194,11 +198,20 @@ class TrialRunner:
     def reward(
         self, recording: Recording, prototypes: Sequence[Array]
     ) -> float:
-        """R of paper Eq. 10, from the sound alone."""
+        """R of paper Eq. 10, from the sound alone.
+
+        Args:
+            recording: A trial's recording.
+            prototypes: Spectrograms (bands, frames) of sounds of the drum.
+        """
         return reward(self.spectrogram(recording), prototypes)
 
     def prototype(self, recording: Recording) -> Array:
-        """The recording's loudest moment, as a prototype for rewards."""
+        """The recording's loudest moment, as a prototype for rewards.
+
+        Args:
+            recording: A trial's recording.
+        """
         return cut_prototype(self.spectrogram(recording), self.reward_config)
 
     def gaze(
@@ -312,7 +325,11 @@ class TrialRunner:
         return self.record(start, seed)
 
     def play(self, theta: Array, start: float) -> None:
-        """Has the movement θ (n·K,) begin at the time `start`, s."""
+        """Has the movement θ (n·K,) begin at the time `start`, s.
+
+        Args:
+            theta: Policy parameters (n·K,).
+        """
         self.station.policy.set_policy_parameters(
             self._sub(self.station.policy), theta, start
         )
@@ -403,6 +420,9 @@ class TrialRunner:
 
         For judging only, by the true posture: neither learner nor reward know
         of it.
+
+        Args:
+            recording: The trial's recording.
         """
         plant = self.station.plant
         context = self._sub(plant)
@@ -561,7 +581,11 @@ class TrialRunner:
         return Verdict() if self.injection is None else self.injection.verdict
 
     def log(self, name: str) -> tuple[Array, Array]:
-        """Times (T,) and values (T, size) of a log, each time once."""
+        """Times (T,) and values (T, size) of a log, each time once.
+
+        Args:
+            name: Name of the log.
+        """
         log = self._logs[name].FindLog(self.context)
         t = log.sample_times()
         keep = np.append(np.diff(t) > 1e-9, True)

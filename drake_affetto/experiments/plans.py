@@ -334,7 +334,6 @@ class TeachPlan(Plan):
         # Each position has a seed of its own, counted from seed * SEEDS on.
         100_000,
         "number of positions of the drum, a demonstration at each",
-        aliases=("positions",),
     )
     scenario: str = option("drumming", "scenario, by name or YAML file")
     seed: int = number(0, 0, GREATEST_SEED, "seed of everything that is random")

@@ -122,6 +122,10 @@ def read_spec(folder: str | Path, key: str) -> tuple[str, Spec]:
 def run_again(folder: str | Path, key: str) -> TrialResult:
     """Runs a stored trial again; gives the same result on the same machine.
 
+    Args:
+        folder: Folder of the study.
+        key: Key of the trial, or how it begins.
+
     Raises:
         InputError: As `read_spec`.
     """

@@ -85,6 +85,9 @@ def read_trials(path: str | Path) -> "pd.DataFrame":
 def write_trials(path: str | Path, table: "pd.DataFrame") -> None:
     """Writes a table of trials as .csv or .parquet, whole or not at all.
 
+    Args:
+        table: A row each trial, as `read_trials` gives it.
+
     Raises:
         InputError: If the name ends otherwise, or it cannot be written.
     """

@@ -298,7 +298,12 @@ def plan_seeds(domain: str, plan: ToyPlan) -> dict[int, Spec]:
 
 
 def run_toy(executor: TrialExecutor, plan: ToyPlan) -> ToyResults:
-    """Runs the experiment on all domains."""
+    """Runs the experiment on all domains.
+
+    Args:
+        executor: Runs the trials.
+        plan: What is to be done.
+    """
     found = {
         name: gather(
             executor.run(f"{name} square", plan_seeds(name, plan)).values()

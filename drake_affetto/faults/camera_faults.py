@@ -127,7 +127,15 @@ class CameraFaults(LeafSystem):
         system: "CameraFaults",
         name: str = "camera_faults",
     ) -> "CameraFaults":
-        """Adds the system, wired to the camera and its faults."""
+        """Adds the system, wired to the camera and its faults.
+
+        Args:
+            color_image: The camera's image.
+            sight: The camera's snapshot of its geometry.
+            body_poses: Poses of the plant's bodies.
+            camera_faults: The fault source's output of that name.
+            system: The system that is added.
+        """
         builder.AddNamedSystem(name, system)
         for port, target in (
             (color_image, "color_image"),

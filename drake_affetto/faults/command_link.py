@@ -79,7 +79,13 @@ class CommandLink(LeafSystem):
         lag: float,
         name: str = "command_link",
     ) -> "CommandLink":
-        """Adds a link that hands `command` on."""
+        """Adds a link that hands `command` on.
+
+        Args:
+            ticks: The fault source's output of that name.
+            period: Period of the controller, s.
+            lag: Time from a tick to its command, s.
+        """
         link = CommandLink(command.size(), period, lag)
         builder.AddNamedSystem(name, link)
         builder.Connect(command, link.get_command_input_port())

@@ -43,6 +43,8 @@ def _whole(place: str, text: str) -> Kind:
     return Kind(place, 1.0, 1.0, "", text)
 
 
+#: Kinds of faults by their names: where each acts, its least and greatest size
+#: with the unit, and what it does.
 KINDS: dict[str, Kind] = {
     "joint_stuck": _whole("joint", "a joint's reading stays as it is"),
     "joint_offset": Kind(

@@ -101,7 +101,11 @@ class FaultSource(LeafSystem):
         return found
 
     def set_schedule(self, context: Context, schedule: FaultSchedule) -> None:
-        """Sets the faults of the trial."""
+        """Sets the faults of the trial.
+
+        Args:
+            schedule: The faults of the trial.
+        """
         context.get_mutable_abstract_parameter(self._schedule_index).set_value(
             schedule
         )

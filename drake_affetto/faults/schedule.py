@@ -60,11 +60,20 @@ class FaultSchedule:
                 yield number, fault, time - onset
 
     def rng(self, number: int, *more: int) -> np.random.Generator:
-        """The source of what is random in the fault of that number."""
+        """The source of what is random in the fault of that number.
+
+        Args:
+            number: Number of the fault in the list.
+            more: Further numbers that tell draws of it apart.
+        """
         return np.random.default_rng([self.seed, 0xFA017, number, *more])
 
     def sign(self, number: int) -> float:
-        """-1 or 1, the same throughout the trial."""
+        """-1 or 1, the same throughout the trial.
+
+        Args:
+            number: Number of the fault in the list.
+        """
         return float(self.rng(number).choice((-1.0, 1.0)))
 
     def readings(
@@ -137,7 +146,13 @@ class FaultSchedule:
         return effect, -min(lost, gauge)
 
     def ticks(self, time: float, movement: float, tick: int) -> Array:
-        """Whether this tick's command is lost, and how late it comes, (2,)."""
+        """Whether this tick's command is lost, and how late it comes, (2,).
+
+        Args:
+            time: Time, s.
+            movement: When the movement begins, s.
+            tick: Number of the tick.
+        """
         effect = np.zeros(TICK_SIZE)
         for i, fault, _ in self.active(time, movement, "ticks"):
             if fault.kind == "ticks_late":
@@ -147,7 +162,12 @@ class FaultSchedule:
         return effect
 
     def camera(self, time: float, movement: float) -> Array:
-        """What stands before the camera, and whether it is frozen, (5,)."""
+        """What stands before the camera, and whether it is frozen, (5,).
+
+        Args:
+            time: Time, s.
+            movement: When the movement begins, s.
+        """
         effect = np.zeros(CAMERA_SIZE)
         for i, fault, _ in self.active(time, movement, "camera"):
             drawn = float(self.rng(i).uniform())
@@ -160,7 +180,11 @@ class FaultSchedule:
         return effect
 
     def acts_on(self, *places: str) -> bool:
-        """Whether any fault of the trial is of these places."""
+        """Whether any fault of the trial is of these places.
+
+        Args:
+            places: Names of places of faults.
+        """
         return any(fault.place in places for fault in self.faults)
 
     def _channel(self, fault: Fault) -> int:

@@ -181,7 +181,11 @@ class Supervisor(LeafSystem):
     get_scores_output_port = output_port("Greatest score of each check.")
 
     def watch(self, context: Context, on: bool) -> None:
-        """Begins to watch, or ends it; forgets what was before."""
+        """Begins to watch, or ends it; forgets what was before.
+
+        Args:
+            on: Whether it watches.
+        """
         context.get_mutable_numeric_parameter(self._on_index).SetFromVector(
             np.array([float(on)])
         )

@@ -59,11 +59,18 @@ class SerialChain:
         return np.array([angles.get(name, 0.0) for name in self.names])
 
     def pose(self, q: Array) -> Array:
-        """Pose of the tip in world, (..., 4, 4), at angles q (..., n)."""
+        """Pose of the tip in world, (..., 4, 4), at angles q (..., n).
+
+        Args:
+            q: Angles of the n joints (..., n), rad.
+        """
         return self._walk(q)[0]
 
     def position_jacobian(self, q: Array) -> tuple[Array, Array]:
         """Pose of the tip and the Jacobian of its origin.
+
+        Args:
+            q: Angles of the n joints (..., n), rad.
 
         Returns:
             X_WT (..., 4, 4) and J (..., 3, n) [m/rad] with ṗ_WT = J q̇.
@@ -126,6 +133,8 @@ def solve_position(
         margin: part of each joint's range to keep off either limit.
         damping: of the least squares [m].
         comfort: step towards `rest` in each iteration, 0 to 1.
+        chain: The joints and the tip.
+        iterations: Number of steps.
 
     Returns:
         (m, n) postures and (m,) distances [m] left to the targets.

@@ -22,7 +22,12 @@ from drake_affetto.common.typing import Array, Mask
 
 
 def make_pose(R: Array, p: Array) -> Array:
-    """The 4 × 4 matrix of a pose of rotation R (3, 3) and origin p (3,)."""
+    """The 4 × 4 matrix of a pose of rotation R (3, 3) and origin p (3,).
+
+    Args:
+        R: Rotation (3, 3).
+        p: Origin (3,), m.
+    """
     X = np.eye(4)
     X[:3, :3] = R
     X[:3, 3] = p
@@ -30,13 +35,22 @@ def make_pose(R: Array, p: Array) -> Array:
 
 
 def invert_pose(X_AB: Array) -> Array:
-    """X_BA of the rigid transform X_AB."""
+    """X_BA of the rigid transform X_AB.
+
+    Args:
+        X_AB: Pose (4, 4) of frame B in frame A.
+    """
     R = X_AB[:3, :3].T
     return make_pose(R, -R @ X_AB[:3, 3])
 
 
 def transform_points(X_AB: Array, p_BQ: Array) -> Array:
-    """p_AQ of points p_BQ (..., 3)."""
+    """p_AQ of points p_BQ (..., 3).
+
+    Args:
+        X_AB: Pose (4, 4) of frame B in frame A.
+        p_BQ: Points in frame B (..., 3), m.
+    """
     return np.asarray(p_BQ, dtype=float) @ X_AB[:3, :3].T + X_AB[:3, 3]
 
 
@@ -89,6 +103,11 @@ class PinholeCamera(_ImagePlane):
     def from_fov(cls, width: int, height: int, fov_y: float) -> "PinholeCamera":
         """Square pixels and a central principal point; fov_y in rad.
 
+        Args:
+            width: Width of the image, pixels.
+            height: Height of the image, pixels.
+            fov_y: Vertical field of view, rad.
+
         Raises:
             InputError: For a size below one pixel, or an angle not in (0, π).
         """
@@ -128,7 +147,14 @@ class PinholeCamera(_ImagePlane):
         return d / np.linalg.norm(d, axis=-1, keepdims=True)
 
     def crop(self, left: int, top: int, width: int, height: int):
-        """The same camera that keeps a rectangle of its image only."""
+        """The same camera that keeps a rectangle of its image only.
+
+        Args:
+            left: First column that is kept.
+            top: First row that is kept.
+            width: Width that is kept, pixels.
+            height: Height that is kept, pixels.
+        """
         return dataclasses.replace(
             self,
             width=width,
@@ -154,8 +180,11 @@ class FisheyeCamera(_ImagePlane):
     f·ϑ·(1 + k₁ϑ² + k₂ϑ⁴), the equidistant model with the polynomial of
     Kannala and Brandt (IEEE PAMI 28(8), 2006).
 
-    Attributes: as of `PinholeCamera`, and
-        k1, k2: coefficients of the radial polynomial.
+    The other attributes are those of `PinholeCamera`.
+
+    Attributes:
+        k1: coefficient of ϑ² in the radial polynomial.
+        k2: coefficient of ϑ⁴.
     """
 
     k1: float = 0.0
@@ -171,6 +200,13 @@ class FisheyeCamera(_ImagePlane):
         k2: float = 0.0,
     ) -> "FisheyeCamera":
         """Square pixels and a central principal point; fov_y in rad.
+
+        Args:
+            width: Width of the image, pixels.
+            height: Height of the image, pixels.
+            fov_y: Vertical field of view, rad.
+            k1: Coefficient of ϑ².
+            k2: Coefficient of ϑ⁴.
 
         Raises:
             InputError: For a size below one pixel, an angle not in (0, 2π), or
@@ -435,6 +471,12 @@ def disc_outline(
 
     The radius is that of the circle of equal area to the polygon, so that
     areas of projections come out unbiased.
+
+    Args:
+        center: Center of the circle (3,), m.
+        normal: Unit normal of its plane (3,).
+        radius: Radius of the circle, m.
+        n: Number of points.
     """
     normal = np.asarray(normal, dtype=float) / np.linalg.norm(normal)
     helper = np.eye(3)[np.argmin(np.abs(normal))]

@@ -84,7 +84,11 @@ class BandScale:
     factor: Array
 
     def band(self, center: Simulated, members: Sequence[Simulated]) -> Band:
-        """The band about `center`, with what each member predicts."""
+        """The band about `center`, with what each member predicts.
+
+        Args:
+            members: What each member of the ensemble predicts.
+        """
         half = self.factor * error_scale(center, members, self.floor)
         middle = as_rows(center)
         lower, upper = middle - half, middle + half

@@ -40,14 +40,22 @@ class FitParameter:
         return (value - self.lower) / (self.upper - self.lower)
 
     def decode(self, fraction: float) -> float:
-        """The inverse of `encode`, limited to the bounds."""
+        """The inverse of `encode`, limited to the bounds.
+
+        Args:
+            fraction: Place between the bounds, in [0, 1].
+        """
         fraction = min(max(fraction, 0.0), 1.0)
         if self.logarithmic:
             return self.lower * (self.upper / self.lower) ** fraction
         return self.lower + fraction * (self.upper - self.lower)
 
     def slope(self, fraction: float) -> float:
-        """The derivative of `decode`."""
+        """The derivative of `decode`.
+
+        Args:
+            fraction: Place between the bounds, in [0, 1].
+        """
         if self.logarithmic:
             return self.decode(fraction) * math.log(self.upper / self.lower)
         return self.upper - self.lower
@@ -134,7 +142,11 @@ class JointProblem:
         )
 
     def kernel_parameters(self, values: dict[str, float]) -> Array:
-        """The (ROWS, 1) parameter array of the compiled kernel."""
+        """The (ROWS, 1) parameter array of the compiled kernel.
+
+        Args:
+            values: Values by the parameter's name.
+        """
         actuator = self.fitted_actuator(values)
         supply = dataclasses.replace(
             self.supply,

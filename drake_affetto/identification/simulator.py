@@ -76,7 +76,11 @@ class Simulated(JointCourse):
     """
 
     def errors(self, log: RobotLog) -> Array:
-        """Differences to the log, (N, 3): angle, %, and p_a and p_b, kPa."""
+        """Differences to the log, (N, 3): angle, %, and p_a and p_b, kPa.
+
+        Args:
+            log: The log that was simulated.
+        """
         n = self.t.size
         return np.stack(
             [
@@ -88,7 +92,11 @@ class Simulated(JointCourse):
         )
 
     def rms(self, log: RobotLog) -> Array:
-        """Rms errors from `JUDGED_FROM` on, (3,), of angle, p_a and p_b."""
+        """Rms errors from `JUDGED_FROM` on, (3,), of angle, p_a and p_b.
+
+        Args:
+            log: The log that was simulated.
+        """
         judged = self.errors(log)[self.t >= JUDGED_FROM]
         return np.sqrt(np.mean(judged**2, axis=0))
 
@@ -290,7 +298,11 @@ class JointSimulator:
     """Simulates logs of one joint with given parameter values."""
 
     def __init__(self, problem: JointProblem):
-        """Prepares the filter of the robot's controller."""
+        """Prepares the filter of the robot's controller.
+
+        Args:
+            problem: The joint, its parameters and what is known of them.
+        """
         self.problem = problem
         controller = problem.controller
         self._filter = butter(

@@ -61,7 +61,7 @@ _REMEMBERED_GRIDS = 16
 
 
 class Rollout(NamedTuple):
-    """A movement: time (N,), and position, velocity, acceleration (N, n)."""
+    """A movement: `t` (N,), `q`, `q_dot` and `q_ddot` (N, n), s and rad."""
 
     t: Array
     q: Array
@@ -140,7 +140,7 @@ class Dmp:
         return self._centers.copy()
 
     def basis(self, phase: ArrayLike) -> Array:
-        """The normalized basis functions ψ(x): phase (N,) to (N, K)."""
+        """The basis functions ψ(x): `phase` (N,), from 1 to 0, to (N, K)."""
         phase = np.atleast_1d(require_array("phase", phase))
         exponent = (phase[:, None] - self._centers) ** 2
         # Subtracting the least leaves the quotient as it is, and keeps it a
@@ -151,7 +151,7 @@ class Dmp:
         return psi
 
     def weights(self, theta: ArrayLike) -> Array:
-        """θ (n·K,) as an array (n, K), a row for each joint.
+        """`theta` (n·K,) as an array (n, K), a row for each joint.
 
         Raises:
             InputError: if its size is no multiple of K or it is not finite.
@@ -275,7 +275,9 @@ class Dmp:
         return phase, state[0], state[1]
 
     def step_table(self, dt: float, duration: float) -> StepTable:
-        """What steps of length dt need, made once and then remembered.
+        """What steps of length `dt` of a movement of `duration`, s, need.
+
+        It is made once and then remembered.
 
         Raises:
             InputError: For a dt or a duration that cannot be.

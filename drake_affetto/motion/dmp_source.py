@@ -119,6 +119,9 @@ class DmpSource(LeafSystem):
         The phase is set to 1. Set it before a simulation, not within one: the
         desired posture jumps to q.
 
+        Args:
+            q: Angles of the joints (n,), rad.
+
         Raises:
             InputError: if q has another size or is not finite.
         """
@@ -133,6 +136,9 @@ class DmpSource(LeafSystem):
 
     def set_duration(self, context: Context, duration: float) -> None:
         """Sets the duration of the movement, s.
+
+        Args:
+            duration: Duration, s.
 
         Raises:
             InputError: if it is no positive number.
@@ -200,6 +206,12 @@ class DmpSource(LeafSystem):
         update_period: float = 0.005,
         name: str = "dmp_source",
     ) -> "DmpSource":
-        """Adds a DmpSource of that name to the builder and returns it."""
+        """Adds a DmpSource of that name to the builder and returns it.
+
+        Args:
+            dmp: The movement primitive.
+            num_joints: Number of joints, n.
+            update_period: Period of the updates, s.
+        """
         system = DmpSource(dmp, num_joints, update_period=update_period)
         return builder.AddNamedSystem(name, system)

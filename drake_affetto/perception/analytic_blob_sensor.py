@@ -125,7 +125,13 @@ class AnalyticBlobSensor(BlobReporter):
         radius: float,
         name: str = "blob_sensor",
     ) -> "AnalyticBlobSensor":
-        """Adds a sensor in the place of a BlobSensor, under its name."""
+        """Adds a sensor in the place of a BlobSensor, under its name.
+
+        Args:
+            query_object: Output of the scene graph.
+            camera: The camera whose place is taken.
+            radius: Radius of the marker, m.
+        """
         sensor = AnalyticBlobSensor(plant, camera.config, config, radius=radius)
         builder.AddNamedSystem(name, sensor)
         builder.Connect(query_object, sensor.get_query_object_input_port())

@@ -20,7 +20,13 @@ from drake_affetto.perception.blob import BlobCalibration
 
 @dataclasses.dataclass(frozen=True)
 class Mirror:
-    """A planar mirror: pose X_WM (4, 4), z its normal, and its size [m]."""
+    """A planar mirror: pose X_WM (4, 4), z its normal, and its size [m].
+
+    Attributes:
+        X_WM: Pose in the world (4, 4).
+        width: Width of the glass, m.
+        height: Height of the glass, m.
+    """
 
     X_WM: Array
     width: float
@@ -122,7 +128,11 @@ class CameraModel:
     def view(
         self, xy: Array, yaw: float, mirror: Mirror | None = None
     ) -> MarkerImage:
-        """The marker's image, seen directly or in a mirror."""
+        """The marker's image, seen directly or in a mirror.
+
+        Args:
+            mirror: Mirror to look into; None looks directly.
+        """
         X_WC = self.camera_pose(yaw)
         return view_disc(
             self.camera,
@@ -139,6 +149,9 @@ class CameraModel:
         """Pixels (n, 2) of points at the marker's level over xy (n, 2).
 
         NaN where a point is behind the camera or not within the mirror.
+
+        Args:
+            mirror: Mirror to look into; None looks directly.
         """
         p_W = self.marker(xy)
         X_WC = self.camera_pose(yaw)
@@ -214,7 +227,11 @@ class CameraModel:
     def direct_task_parameters(
         self, xy: Array, calibration: BlobCalibration
     ) -> Array:
-        """τ = [y_img, q₃*] (n, 2) of drums at xy (n, 2); NaN if unseen."""
+        """τ = [y_img, q₃*] (n, 2) of drums at xy (n, 2); NaN if unseen.
+
+        Args:
+            calibration: The box that the image coordinates are scaled by.
+        """
         yaws, pixels = self.direct_pixels(xy)
         y = calibration.normalize(pixels)[:, 1]
         return np.stack([y, yaws], axis=-1)
@@ -225,6 +242,9 @@ class CameraModel:
         """Where the marker shows largest: which mirror (None: directly).
 
         That is the image that the blob sensor takes.
+
+        Args:
+            mirrors: The mirrors of the scene.
         """
         views: list[tuple[int | None, MarkerImage]] = [
             (None, self.view(xy, yaw))
@@ -240,7 +260,12 @@ class CameraModel:
         mirrors: Sequence[Mirror] = (),
         least: float = 1.0,
     ) -> Array:
-        """Centroids uv (n, 2) from a fixed yaw; NaN where not wholly seen."""
+        """Centroids uv (n, 2) from a fixed yaw; NaN where not wholly seen.
+
+        Args:
+            mirrors: The mirrors of the scene.
+            least: Share of the marker that must be seen.
+        """
         xy = np.atleast_2d(np.asarray(xy, dtype=float))
         pixels = np.full((len(xy), 2), np.nan)
         for i, place in enumerate(xy):

@@ -152,7 +152,11 @@ class GazeTask:
 
     @classmethod
     def from_vector(cls, vector: Array) -> "GazeTask":
-        """The inverse of `to_vector`."""
+        """The inverse of `to_vector`.
+
+        Args:
+            vector: As `to_vector` gives it.
+        """
         return cls(
             bool(vector[0] > 0.5),
             GazeMode(round(float(vector[1]))),
@@ -233,14 +237,25 @@ class Gaze:
         return x
 
     def wants_image(self, x: Array, task: GazeTask) -> bool:
-        """Whether a further image is of any use."""
+        """Whether a further image is of any use.
+
+        Args:
+            x: State of the search.
+            task: What the trial asks.
+        """
         return task.enabled and x[PHASE] not in (
             GazePhase.SETTLED,
             GazePhase.FAILED,
         )
 
     def yaw_command(self, x: Array, t: float, task: GazeTask) -> float:
-        """The commanded yaw [rad] at time t: a ramp without jumps."""
+        """The commanded yaw [rad] at time t: a ramp without jumps.
+
+        Args:
+            x: State of the search.
+            t: Time, s.
+            task: What the trial asks.
+        """
         if not task.enabled or x[PHASE] == GazePhase.START:
             return task.start_yaw
         reach = x[SPEED] * max(t - x[T_RAMP], 0.0)
@@ -248,15 +263,31 @@ class Gaze:
         return float(x[YAW_RAMP] + min(max(way, -reach), reach))
 
     def is_settled(self, x: Array, task: GazeTask) -> bool:
-        """Whether τ is known."""
+        """Whether τ is known.
+
+        Args:
+            x: State of the search.
+            task: What the trial asks.
+        """
         return task.enabled and x[PHASE] == GazePhase.SETTLED
 
     def is_failed(self, x: Array, task: GazeTask) -> bool:
-        """Whether the trial is given up."""
+        """Whether the trial is given up.
+
+        Args:
+            x: State of the search.
+            task: What the trial asks.
+        """
         return task.enabled and x[PHASE] == GazePhase.FAILED
 
     def is_ready(self, x: Array, t: float, task: GazeTask) -> bool:
-        """Whether τ is known and the yaw command has come to rest."""
+        """Whether τ is known and the yaw command has come to rest.
+
+        Args:
+            x: State of the search.
+            t: Time, s.
+            task: What the trial asks.
+        """
         return self.is_settled(x, task) and (
             abs(self.yaw_command(x, t, task) - x[YAW_GOAL]) < 1e-6
         )

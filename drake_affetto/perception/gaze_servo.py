@@ -34,7 +34,12 @@ _NO = np.zeros(1)
 
 
 def gaze_view(camera: Camera, calibration: BlobCalibration) -> GazeView:
-    """How the calibrated blob coordinates lie in a camera's image."""
+    """How the calibrated blob coordinates lie in a camera's image.
+
+    Args:
+        camera: Camera and lens.
+        calibration: The box that the coordinates are scaled by.
+    """
     unit_x = calibration.u_max - calibration.u_min
     unit_y = calibration.v_max - calibration.v_min
     center = calibration.normalize(camera.image_center)
@@ -167,7 +172,16 @@ class GazeServo(LeafSystem):
         latency: float = 0.0,
         name: str = "gaze_servo",
     ) -> "GazeServo":
-        """Adds a servo wired to a blob sensor and to the joints' state."""
+        """Adds a servo wired to a blob sensor and to the joints' state.
+
+        Args:
+            blob: The blob sensor's output.
+            estimated_state: [q; q̇] (2n) of the active joints, rad and rad/s.
+            yaw_index: Place of the yaw joint among them.
+            view: How the blob's coordinates lie in the image.
+            rate: Rate of the images, Hz.
+            latency: Delay from exposure to use, s.
+        """
         servo = GazeServo(
             estimated_state.size() // 2, yaw_index, view, config, rate, latency
         )
@@ -201,17 +215,29 @@ class GazeServo(LeafSystem):
         )
 
     def set_task(self, context: Context, task: GazeTask) -> None:
-        """Sets all that a trial asks of the servo."""
+        """Sets all that a trial asks of the servo.
+
+        Args:
+            task: What the trial asks.
+        """
         context.get_mutable_numeric_parameter(self._task_index).SetFromVector(
             task.to_vector()
         )
 
     def set_enabled(self, context: Context, enabled: bool) -> None:
-        """Whether to look at all (not, while teaching or replaying)."""
+        """Whether to look at all (not, while teaching or replaying).
+
+        Args:
+            enabled: Whether it looks and turns.
+        """
         self._change_task(context, enabled=bool(enabled))
 
     def set_mode(self, context: Context, mode: GazeMode) -> None:
-        """Center the marker, or look from a fixed yaw."""
+        """Center the marker, or look from a fixed yaw.
+
+        Args:
+            mode: Center the marker, or look from a fixed yaw.
+        """
         self._change_task(context, mode=GazeMode(mode))
 
     def set_fixed_yaw(self, context: Context, yaw: float) -> None:

@@ -52,7 +52,11 @@ class ImageEffects:
 
     @classmethod
     def from_vector(cls, vector: Array) -> "ImageEffects":
-        """The inverse of `to_vector`."""
+        """The inverse of `to_vector`.
+
+        Args:
+            vector: As `to_vector` gives it.
+        """
         v = [float(number) for number in vector]
         return cls(v[0], v[1:4], v[4], v[5:7])
 

@@ -260,7 +260,12 @@ class MirrorCamera(LeafSystem):
         render_config: RenderConfig | None = None,
         name: str = "camera",
     ) -> "MirrorCamera":
-        """Adds a camera, and the renderers it needs, wired to the scene."""
+        """Adds a camera, and the renderers it needs, wired to the scene.
+
+        Args:
+            mirrors: Mirrors of the scene; none by default.
+            render_config: Settings of the renderers.
+        """
         add_renderers(scene_graph, render_config or RenderConfig())
         camera = MirrorCamera(plant, config, mirrors)
         builder.AddNamedSystem(name, camera)
@@ -319,7 +324,11 @@ class MirrorCamera(LeafSystem):
         ]
 
     def set_effects(self, context: Context, effects: ImageEffects) -> None:
-        """Sets exposure, white balance, noise and motion blur."""
+        """Sets exposure, white balance, noise and motion blur.
+
+        Args:
+            effects: What bends the image.
+        """
         context.get_mutable_numeric_parameter(
             self._effects_index
         ).SetFromVector(effects.to_vector())
@@ -343,13 +352,22 @@ class MirrorCamera(LeafSystem):
     def set_camera_pose_in_body(
         self, context: Context, X_BC: RigidTransform
     ) -> None:
-        """Moves the camera on the body that carries it."""
+        """Moves the camera on the body that carries it.
+
+        Args:
+            X_BC: Pose of the camera in the body's frame.
+        """
         context.get_mutable_abstract_parameter(0).set_value(X_BC)
 
     def set_mirror_pose_in_body(
         self, context: Context, index: int, X_BM: RigidTransform
     ) -> None:
-        """Moves a mirror's face on its body."""
+        """Moves a mirror's face on its body.
+
+        Args:
+            index: Number of the mirror.
+            X_BM: Pose of its face in the body's frame.
+        """
         context.get_mutable_abstract_parameter(1 + index).set_value(X_BM)
 
     # Calculations

@@ -93,15 +93,27 @@ class OpticalMap:
         return 3
 
     def apply(self, parameters: Array, X: Array) -> Array:
-        """h(X): parameters (3,), X (N, 2) to (N, 2)."""
+        """h(X): parameters (3,), X (N, 2) to (N, 2).
+
+        Args:
+            parameters: The plane's three numbers.
+        """
         return self._evaluate(parameters, X)[0]
 
     def derivative(self, parameters: Array, X: Array) -> Array:
-        """∂h/∂p: parameters (3,), X (N, 2) to (N, 2, 3)."""
+        """∂h/∂p: parameters (3,), X (N, 2) to (N, 2, 3).
+
+        Args:
+            parameters: The plane's three numbers.
+        """
         return self._evaluate(parameters, X)[1]
 
     def place(self, parameters: Array, X: Array) -> Array:
-        """Where on the table, xy (N, 2) [m], the marker seen at X (N, 2) is."""
+        """Where on the table, xy (N, 2) [m], the marker seen at X (N, 2) is.
+
+        Args:
+            parameters: The plane's three numbers.
+        """
         eye, ray = self._rays(X)
         return self._reflect(parameters, eye, ray)[0][:, :2]
 

@@ -293,6 +293,10 @@ class PneumaticActuation(LeafSystem):
     ) -> None:
         """Changes the actuators; nothing of a trial's draw is left.
 
+        Args:
+            parameters: Array with the rows of `chamber.Row`, a column each
+                joint.
+
         Raises:
             InputError: for another shape, or a dead time longer than the one
                 that the system was built for.

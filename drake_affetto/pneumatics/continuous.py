@@ -155,17 +155,28 @@ def ContinuousPneumaticActuation_(T):
         )
 
         def set_pressures(self, context: Context_[T], p_a, p_b, q=None) -> None:
-            """Sets pressures (n) [Pa absolute] at the joint angles q [rad].
+            """Sets the chambers' pressures, with the valves at rest.
 
-            Valves are at rest and the air has ambient temperature. By default
-            the angles are those of the input `estimated_state`.
+            The air has ambient temperature.
+
+            Args:
+                context: Context of the system.
+                p_a: Pressures of the chambers a (n), Pa absolute.
+                p_b: Pressures of the chambers b (n), Pa absolute.
+                q: Angles of the joints (n), rad; by default those of the input
+                    `estimated_state`.
             """
             if q is None:
                 q = self._state_port.Eval(context)[: self._n]
             context.SetContinuousState(self._rest(p_a, p_b, q))
 
         def set_strokes(self, context: Context_[T], opening) -> None:
-            """Puts the spools where openings v⁺ (n) hold them, v⁻ = -v⁺."""
+            """Puts the spools where openings hold them.
+
+            Args:
+                context: Context of the system.
+                opening: v⁺ (n) in [-1, 1]; v⁻ = -v⁺.
+            """
             state = context.get_continuous_state_vector().CopyToVector()
             state[4 * self._n :] = np.concatenate([opening, -opening])
             context.SetContinuousState(state)

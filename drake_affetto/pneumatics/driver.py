@@ -220,6 +220,9 @@ def AddPneumaticDriver(
     both as read. `longest_delay` is the most, s, that a trial adds to a dead
     time. `carry` adds what carries the controller's commands to the valves; the
     actuators then have inputs for faults, which are left to be connected too.
+
+    Args:
+        model_instance: The model's instance in the plant.
     """
     model = plant.GetModelInstanceName(model_instance)
     config.check(model)

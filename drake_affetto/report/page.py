@@ -92,6 +92,7 @@ def make_page(folders: Mapping[str, StudyFolder]) -> str:
         bodies=bodies,
         style=_resource("page.css"),
         script=_resource("page.js"),
+        walk=_resource("walk.js"),
         plotly=_plotly(),
         figures=_json({chart.key: chart.figure.to_json() for chart in charts}),
         colors=_json({color: DARK[name] for name, color in LIGHT.items()}),

@@ -79,7 +79,11 @@ class CommandInbox:
         self._other, self._sender = (self._sender, now), sender
 
     def watch(self, now: float) -> None:
-        """Sees whether the client has fallen silent; vents if it is told to."""
+        """Sees whether the client has fallen silent; vents if it is told to.
+
+        Args:
+            now: Time, s.
+        """
         if self._silent or self.last is None or now - self.last < self.timeout:
             return
         self._silent = True

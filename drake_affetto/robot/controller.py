@@ -72,6 +72,9 @@ class RobotController:
 def load_robot_controller(file: str | Path = PID_FILE) -> RobotController:
     """Reads the robot's controller from a YAML file.
 
+    Args:
+        file: The file, or its package:// URI.
+
     Raises:
         InputError: If the file or a value in it does not fit.
     """

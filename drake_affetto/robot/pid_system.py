@@ -43,6 +43,10 @@ class RobotPid(LeafSystem):
     def __init__(self, controller: RobotController, wire: RobotWire):
         """Takes the gains of the wire's joints.
 
+        Args:
+            controller: Gains and stiffness of the robot's own software.
+            wire: Joints and their ranges.
+
         Raises:
             InputError: If a joint of the wire has no gains.
         """

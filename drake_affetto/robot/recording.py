@@ -18,6 +18,9 @@ class WireRecording:
     def __init__(self, path: str | Path, num_joints: int):
         """Begins the file.
 
+        Args:
+            num_joints: Number of joints, n.
+
         Raises:
             InputError: If it cannot be written.
         """

@@ -64,7 +64,11 @@ class WireSockets:
         self._socket.setblocking(False)
 
     def send(self, packet: bytes) -> None:
-        """Sends a sensor packet to the client, whether one is there or not."""
+        """Sends a sensor packet to the client, whether one is there or not.
+
+        Args:
+            packet: Bytes of the packet.
+        """
         try:
             self._socket.sendto(packet, self.client)
         except OSError:

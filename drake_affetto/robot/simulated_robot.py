@@ -106,7 +106,11 @@ class SimulatedRobot:
         return self._ticks * self._period
 
     def command(self, pressure: Array) -> None:
-        """Sets the regulators' set-points [p_a; p_b] (2n,), Pa absolute."""
+        """Sets the regulators' set-points [p_a; p_b] (2n,), Pa absolute.
+
+        Args:
+            pressure: Set-points [p_a; p_b] (2n,), Pa absolute.
+        """
         self._command.GetMutableData().get_mutable_value().SetFromVector(
             pressure
         )

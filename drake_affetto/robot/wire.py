@@ -145,7 +145,11 @@ class PacketCodec:
     """
 
     def __init__(self, wire: RobotWire):
-        """Prepares the scales of the wire's joints."""
+        """Prepares the scales of the wire's joints.
+
+        Args:
+            wire: Joints, their ranges and their order on the wire.
+        """
         n = len(wire.joints)
         require(n > 0, "joints", wire.joints, "at least one joint")
         self.num_joints = n
@@ -179,12 +183,20 @@ class PacketCodec:
         return out.ravel()
 
     def write_sensors(self, q: Array, pressure: Array) -> bytes:
-        """The sensors' packet; for arguments see `sensor_values`."""
+        """The sensors' packet; for arguments see `sensor_values`.
+
+        Args:
+            q: Angles (n,), rad.
+            pressure: Pressures [p_a; p_b] (2n,), Pa absolute.
+        """
         values = self.sensor_values(q, pressure).tolist()
         return " ".join(map("{:.1f}".format, values)).encode("ascii")
 
     def read_sensors(self, packet: bytes) -> tuple[Array, Array]:
         """The angles (n,), rad, and pressures (2n,), Pa, of a packet.
+
+        Args:
+            packet: Bytes of the packet.
 
         Raises:
             PacketError: If it is no such packet, or a value cannot be.
@@ -229,12 +241,19 @@ class PacketCodec:
         return np.clip(levels, 0.0, COMMAND_MAXIMUM)
 
     def write_command(self, pressure: Array) -> bytes:
-        """The packet of a command; for the argument see `command_levels`."""
+        """The packet of a command; for the argument see `command_levels`.
+
+        Args:
+            pressure: Set-points [p_a; p_b] (2n,), Pa absolute.
+        """
         levels = np.rint(self.command_levels(pressure)).astype(int).tolist()
         return " ".join(map(str, levels)).encode("ascii")
 
     def read_levels(self, packet: bytes) -> list[int]:
         """The numbers 0..255 of a command (2n), in the wire's order.
+
+        Args:
+            packet: Bytes of the packet.
 
         Raises:
             PacketError: If it is no such packet.
@@ -251,12 +270,19 @@ class PacketCodec:
         return levels
 
     def set_points(self, levels: Sequence[float]) -> Array:
-        """The set-points [p_a; p_b] (2n,), Pa absolute, of a command."""
+        """The set-points [p_a; p_b] (2n,), Pa absolute, of a command.
+
+        Args:
+            levels: Numbers from 0 to 255 (2n), in the wire's order.
+        """
         gauge = self._wire.command_low + np.asarray(levels) / self._levels
         return self._wire.atmospheric_pressure + _KPA * gauge[self._places]
 
     def read_command(self, packet: bytes) -> Array:
         """The set-points [p_a; p_b] (2n,), Pa absolute, of a packet.
+
+        Args:
+            packet: Bytes of the packet.
 
         Raises:
             PacketError: If it is no such packet.

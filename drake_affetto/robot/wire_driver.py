@@ -100,6 +100,9 @@ class WireDriver(LeafSystem):
     def wait(self, context: Context, timeout: float) -> None:
         """Waits for the robot, and puts what it reads into the state.
 
+        Args:
+            timeout: Longest wait, s.
+
         Raises:
             InputError: If no good packet comes in time.
         """

@@ -278,6 +278,9 @@ class TrialStore:
     ) -> tuple[dict[str, Any], dict[str, np.ndarray]] | None:
         """Result and arrays of a finished trial, or None.
 
+        Args:
+            spec: All that determines the trial.
+
         Raises:
             InputError: If its row is damaged.
         """
@@ -328,6 +331,11 @@ class TrialStore:
     ) -> None:
         """Keeps a finished trial.
 
+        Args:
+            spec: All that determines the trial.
+            result: What came of it.
+            arrays: Arrays that belong to the result.
+
         Raises:
             InputError: if the row cannot be written (a full disk, say); rows
                 that were written before stay.
@@ -367,6 +375,10 @@ class TrialStore:
 
     def plan(self, label: str, specs: Sequence[Mapping[str, Any]]) -> None:
         """Stores the trials of a phase, for `phases` to count.
+
+        Args:
+            label: Name of the phase.
+            specs: All that determines each trial.
 
         Raises:
             InputError: if it cannot be written.

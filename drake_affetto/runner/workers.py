@@ -37,7 +37,12 @@ class InProcessExecutor(Executor):
     """Runs each call at once, in this process: for watching, for debugging."""
 
     def submit(self, fn, /, *args, **kwargs) -> Future:  # type: ignore[override]
-        """Calls `fn` and returns its outcome as a finished future."""
+        """Calls `fn` and returns its outcome as a finished future.
+
+        Args:
+            args: Arguments of `fn`.
+            kwargs: Its keyword arguments.
+        """
         future: Future = Future()
         try:
             future.set_result(fn(*args, **kwargs))

@@ -81,6 +81,9 @@ def select_joints(
 ) -> JointSelection:
     """Selects the joints `names` of a model of the finalized `plant`.
 
+    Args:
+        model_instance: The model's instance in the plant.
+
     Raises:
         InputError: For an unknown joint, one named twice, one that has not
             one degree of freedom, or one without an actuator.

@@ -33,7 +33,11 @@ _FRAMES = (
 
 
 def set_default_camera_pose(meshcat: Meshcat) -> None:
-    """Puts the browser's camera where robot, drum and mirror are in view."""
+    """Puts the browser's camera where robot, drum and mirror are in view.
+
+    Args:
+        meshcat: The browser's view.
+    """
     meshcat.SetCameraPose(CAMERA_POSITION, CAMERA_TARGET)
 
 

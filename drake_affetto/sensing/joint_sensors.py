@@ -146,6 +146,11 @@ class JointSensors(LeafSystem):
             true_pressure: [p_a; p_b] (2n) of the chambers, Pa.
             limits: q_lower and q_upper.
             name: Name of the system.
+            parameters: Resolution, noise and filter of the sensors.
+            joint_names: Names of the n joints.
+            period: Time between two samples, s.
+            lead: Time by which a sample is taken early, s.
+            faulty: Whether the sensors have inputs for faults.
         """
         sensors = JointSensors(
             parameters,

@@ -234,6 +234,9 @@ def _evaluate_exactly(estimator: Any, n_in: int, n_out: int) -> Evaluate | None:
 def input_jacobian(estimator: Any, X: ArrayLike) -> Array:
     """∂ŷ/∂x (N, F, d) of any fitted regressor at X (N, d).
 
+    Args:
+        estimator: A fitted regressor.
+
     Raises:
         NotFittedError: if it has not been fitted.
     """

@@ -182,7 +182,7 @@ class ElmRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         """φᵀ (ΦᵀΦ + α I)⁻¹ φ (N,) at X (N, d).
 
         A prediction there has an error of covariance
-        (leverage + noise) · error_covariance_, with noise = 1 for a further
+        (leverage + noise) · `error_covariance_`, with noise = 1 for a further
         sample and 0 for the function itself.
         """
         half = solve_triangular(self._root, self.hidden(X).T, trans="T")

@@ -62,6 +62,9 @@ class Domain:
     def of_range(cls, limits: ArrayLike) -> Self:
         """The domain of inputs that fill the box limits (d, 2) evenly.
 
+        Args:
+            limits: Lowest and highest value of each input (d, 2).
+
         Raises:
             InputError: For what is no such box.
         """
@@ -103,11 +106,19 @@ class Mapping(abc.ABC):
 
     @abc.abstractmethod
     def apply(self, parameters: Array, X: Array) -> Array:
-        """h(X): parameters (P,), X (N, n_in) to (N, n_out)."""
+        """h(X): parameters (P,), X (N, n_in) to (N, n_out).
+
+        Args:
+            parameters: Parameters p of the map (P,).
+        """
 
     @abc.abstractmethod
     def derivative(self, parameters: Array, X: Array) -> Array:
-        """∂h/∂p at X: parameters (P,), X (N, n_in) to (N, n_out, P)."""
+        """∂h/∂p at X: parameters (P,), X (N, n_in) to (N, n_out, P).
+
+        Args:
+            parameters: Parameters p of the map (P,).
+        """
 
     @abc.abstractmethod
     def starts(
@@ -127,11 +138,19 @@ class Mapping(abc.ABC):
         """
 
     def apply_many(self, parameters: Array, X: Array) -> Array:
-        """`apply` for parameters (S, P): (S, N, n_out)."""
+        """`apply` for parameters (S, P): (S, N, n_out).
+
+        Args:
+            parameters: Parameters of S maps (S, P).
+        """
         return np.array([self.apply(row, X) for row in parameters])
 
     def derivative_many(self, parameters: Array, X: Array) -> Array:
-        """`derivative` for parameters (S, P): (S, N, n_out, P)."""
+        """`derivative` for parameters (S, P): (S, N, n_out, P).
+
+        Args:
+            parameters: Parameters of S maps (S, P).
+        """
         return np.array([self.derivative(row, X) for row in parameters])
 
 
@@ -167,7 +186,11 @@ class Affine(Mapping):
         return np.broadcast_to(one, (len(parameters), *one.shape))
 
     def split(self, parameters: Array, n_in: int) -> tuple[Array, Array]:
-        """p (..., P) to H (..., n_out, n_in) and c (..., n_out)."""
+        """p (..., P) to H (..., n_out, n_in) and c (..., n_out).
+
+        Args:
+            parameters: Parameters p (..., P).
+        """
         n_out = parameters.shape[-1] // (n_in + 1)
         linear = parameters[..., : n_out * n_in]
         return (
@@ -186,6 +209,12 @@ class Affine(Mapping):
 
         Those map mean to mean and deviation to deviation, with axes that are
         kept, reflected, rotated in steps, and rotated at random.
+
+        Args:
+            target: Where inputs of the new view lie.
+            source: Where the skill has learned.
+            n_starts: Number of starts.
+            random: Source of random numbers.
         """
         n_in, n_out = target.mean.size, source.mean.size
         identity = np.eye(n_out, n_in)
@@ -221,7 +250,11 @@ class Similarity(Mapping):
         return X @ self.linear(parameters).T + parameters[2:4]
 
     def linear(self, parameters: Array) -> Array:
-        """H (2, 2)."""
+        """H (2, 2).
+
+        Args:
+            parameters: Parameters p of the map (P,).
+        """
         a, b, _, _, side = parameters
         return np.array([[a, -b * side], [b, a * side]])
 
@@ -244,7 +277,14 @@ class Similarity(Mapping):
         n_starts: int,
         random: np.random.RandomState,
     ) -> list[tuple[str, Array]]:
-        """The identity; then turns in even steps, with and without mirror."""
+        """The identity; then turns in even steps, with and without mirror.
+
+        Args:
+            target: Where inputs of the new view lie.
+            source: Where the skill has learned.
+            n_starts: Number of starts.
+            random: Source of random numbers.
+        """
         named = [("identity", np.array([1.0, 0.0, 0.0, 0.0, 1.0]))]
         scale = math.sqrt(
             np.trace(source.covariance)

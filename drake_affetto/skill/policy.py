@@ -172,6 +172,9 @@ class SkillPolicy(LeafSystem):
     ) -> None:
         """Plays θ (F,) at `start_time`, s, whatever is seen.
 
+        Args:
+            theta: Policy parameters (F,).
+
         Raises:
             InputError: if θ has another size or a value is not finite.
         """
@@ -236,7 +239,12 @@ class SkillPolicy(LeafSystem):
         config: SkillPolicyConfig | None = None,
         name: str = "skill_policy",
     ) -> "SkillPolicy":
-        """Adds a SkillPolicy of that name to the builder and returns it."""
+        """Adds a SkillPolicy of that name to the builder and returns it.
+
+        Args:
+            num_parameters: Number of policy parameters, F.
+            num_task_parameters: Number of task parameters.
+        """
         system = SkillPolicy(
             num_parameters,
             num_task_parameters=num_task_parameters,

@@ -34,6 +34,9 @@ def load_sound_config(
 ) -> SoundConfig:
     """Reads and checks a sound file.
 
+    Args:
+        uri: The file, or its package:// URI.
+
     Raises:
         InputError: for a missing or malformed file, an unknown field or a
             value out of range.

@@ -126,6 +126,10 @@ class DrumMicrophone(LeafSystem):
 
         The drum model has the links `shell` and `head` and a frame
         `head_center` on the head; every link of the table model is table.
+
+        Args:
+            drum_model: Name of the drum's model.
+            table_model: Name of the table's model.
         """
         drum = plant.GetModelInstanceByName(drum_model)
         head = plant.GetBodyByName("head", drum)

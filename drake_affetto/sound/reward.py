@@ -332,6 +332,9 @@ def tap_prototypes(
     """Prototypes (bands, t_p) from the experimenter's own taps.
 
     They judge the first demonstrations, when the robot has not drummed yet.
+
+    Args:
+        voice: The drum.
     """
     config = RewardConfig() if config is None else config
     rng = np.random.default_rng(0) if rng is None else rng

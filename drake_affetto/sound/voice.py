@@ -83,7 +83,11 @@ class DrumVoice:
         return self.config.rate
 
     def mode_shapes(self, radius: ArrayLike) -> Array:
-        """Membrane mode shapes J_m(j_mn r/a), (T, N), at radii (T), m."""
+        """Membrane mode shapes J_m(j_mn r/a), (T, N), at radii (T), m.
+
+        Args:
+            radius: Distances from the center of the head (T), m.
+        """
         scaled = np.clip(
             np.asarray(radius, dtype=float) / self.config.membrane.radius,
             0.0,

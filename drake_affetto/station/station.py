@@ -111,6 +111,7 @@ class AffettoStation(Diagram):
       same time (see `joint_state`).
     - affetto.estimated_state (2n): the same as the robot's sensors have it.
     - affetto.valve_opening (n): v⁺ in [-1, 1].
+    - affetto.pressure_command (2n): set-points [p_a; p_b], Pa absolute.
     - affetto.pid_output (n): u_PID, Pa.
     - affetto.actuation (n): N m.
     - affetto.chamber_pressure (2n): [p_a; p_b] as read, Pa absolute.
@@ -294,6 +295,9 @@ class AffettoStation(Diagram):
     def set_mirror_pose(self, context: Context, pose: world.FramePose) -> None:
         """Puts the mirror elsewhere; the pose is that of `mirror_pose`.
 
+        Args:
+            pose: Pose of the mirror.
+
         Raises:
             InputError: for a pose that is out of range.
         """
@@ -326,6 +330,9 @@ class AffettoStation(Diagram):
 
     def set_posture(self, context: Context, q: ArrayLike) -> None:
         """Sets the active joints to q (n,), rad, at rest.
+
+        Args:
+            q: Angles of the active joints (n,), rad.
 
         Raises:
             InputError: if an angle is beyond its joint's limits.
@@ -630,5 +637,8 @@ class AffettoStation(Diagram):
         """Sets the offset (n,), Pa, that is added to u_PID (paper Eq. 8).
 
         It takes the place of the gravity that the controller compensates.
+
+        Args:
+            offset: Offset of each active joint (n,), Pa.
         """
         self._gravity.set_constant(self._sub(self._gravity, context), offset)

@@ -236,6 +236,9 @@ def write_demonstrations(
 ) -> None:
     """Writes a file of exactly these demonstrations, whole or not at all.
 
+    Args:
+        demonstrations: What the file is to hold.
+
     Raises:
         InputError: If it cannot be written.
     """

@@ -235,6 +235,9 @@ class TuningConfig:
 def load_tuning(file: str | Path = DEFAULT_FILE) -> TuningConfig:
     """Reads a YAML file of `TuningConfig`.
 
+    Args:
+        file: The file, or its package:// URI.
+
     Raises:
         InputError: If the file or a value in it does not fit.
     """

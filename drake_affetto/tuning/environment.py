@@ -54,7 +54,11 @@ class TrackingEnvironment:
     """
 
     def __init__(self, scenario: Scenario, tuning: TuningConfig):
-        """Builds the station, whose input is `desired_state`."""
+        """Builds the station, whose input is `desired_state`.
+
+        Args:
+            scenario: The robot and its scene.
+        """
         # Imported here, for the other modules import without Drake.
         from pydrake.systems.analysis import Simulator
         from pydrake.systems.framework import DiagramBuilder, TriggerType
@@ -177,7 +181,11 @@ class TrackingEnvironment:
         return data.data().T[keep].copy()
 
     def costs(self, reference: Reference, rollout: Rollout) -> JointCosts:
-        """The costs of a rollout along `reference`."""
+        """The costs of a rollout along `reference`.
+
+        Args:
+            rollout: What came of it.
+        """
         return joint_costs(
             reference, rollout.q, rollout.opening, self.span, self.tuning.cost
         )

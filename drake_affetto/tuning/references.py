@@ -116,6 +116,9 @@ def make_reference(
 
     All begin at rest in the start posture and end at rest.
 
+    Args:
+        space: Start posture and limits of the joints.
+
     Raises:
         InputError: If there is no reference of that name.
     """

@@ -15,7 +15,7 @@ from drake_affetto.experiments.plans import DrumPlan, TeachPlan
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    repeats: int = number(2, 1, 10, "how often", aliases=("times",))
+    repeats: int = number(2, 1, 10, "how often")
     after: tuple[int, ...] = number((), 1, 9, "after which")
     active: bool = option(False, "whether")
     hidden: int = number(5, 1, 9)
@@ -34,38 +34,17 @@ def test_options_make_the_plan():
     )
 
 
-def test_earlier_names_work_but_are_not_shown():
-    assert parse("--times", "4").repeats == 4
-    parser = argparse.ArgumentParser()
-    options.add_plan_arguments(parser, Plan)
-    assert "--times" not in parser.format_help()
-    assert "--repeats" in parser.format_help()
-
-
 @pytest.mark.parametrize(
-    ("command", "words", "name", "value"),
+    ("command", "words"),
     [
-        ("teach", ["--out", "x", "--positions", "7"], "demonstrations", 7),
-        ("teach", ["--out", "x", "--by-hand"], "mouse", True),
-        ("mirror", ["--no-exhibits"], "no_media", True),
+        ("teach", ["--out", "x", "--positions", "7"]),
+        ("teach", ["--out", "x", "--by-hand"]),
+        ("mirror", ["--no-exhibits"]),
     ],
 )
-def test_options_of_version_0_1_0_go_on_working(command, words, name, value):
-    parser = make_parser(command)
-    args = parser.parse_args([command, *words])
-    assert getattr(args, name) == value
-    fewer = parser.parse_args(
-        [command, *words[:2]] if name != "no_media" else [command]
-    )
-    assert getattr(fewer, name) != value
-
-
-def test_their_names_are_not_in_the_help(capsys):
-    for command in ("teach", "mirror"):
-        assert main([command, "--help"]) == 0
-        shown = capsys.readouterr().out
-        for old in ("--positions", "--by-hand", "--no-exhibits"):
-            assert old not in shown
+def test_options_of_version_0_1_0_are_gone(command, words, capsys):
+    assert main([command, *words]) == 2
+    assert "unrecognized arguments" in capsys.readouterr().err
 
 
 def test_the_plans_defaults_are_the_commands():

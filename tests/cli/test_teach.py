@@ -27,7 +27,7 @@ def test_a_drum_that_is_not_seen_is_reported():
 
 def teach(path, *more):
     return cli.main(
-        ["teach", "--positions", "2", "--workers", "0", "--out", str(path)]
+        ["teach", "--demonstrations", "2", "--workers", "0", "--out", str(path)]
         + list(more)
     )
 

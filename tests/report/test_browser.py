@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from support import headless_browser
+from support import accessibility, headless_browser
 
 
 @pytest.fixture(scope="module")
@@ -143,3 +143,74 @@ def test_browser_can_be_led_by_keyboard(browser, demo):
     for kind, outline in reached:
         if kind in ("BUTTON", "SUMMARY", "DIV"):
             assert outline != "none"
+
+
+WALK = "document.querySelectorAll('.walk')[{}]"
+
+
+def spoken_after(browser, *keys):
+    for key in keys:
+        browser.press(key, 0)
+    return browser.evaluate("document.getElementById('spoken').textContent")
+
+
+def ring_of(browser, chart):
+    """Where the mark is in a chart, from 0 to 1; None if it is hidden."""
+    return browser.evaluate(
+        "(chart => { const ring = chart.querySelector('.ring');"
+        " if (ring.hidden) return null;"
+        " const b = ring.getBoundingClientRect();"
+        " const c = chart.getBoundingClientRect();"
+        " return [((b.left + b.right) / 2 - c.left) / c.width,"
+        f" ((b.top + b.bottom) / 2 - c.top) / c.height]; }})({chart})"
+    )
+
+
+def test_charts_are_walked_by_the_arrow_keys(browser, whole):
+    show(browser, whole)
+    chart = WALK.format(0)
+    browser.evaluate(f"{chart}.focus()")
+    assert ring_of(browser, chart) is None
+    first = spoken_after(browser, "ArrowRight")
+    start = ring_of(browser, chart)
+    second = spoken_after(browser, "ArrowRight")
+    assert re.search(r"1 demonstrations: 23 %.*Point 1 of 25", first)
+    assert re.search(r"2 demonstrations: 30 %.*Point 2 of 25", second)
+    assert ring_of(browser, chart)[0] > start[0]
+    # Into another series at the same place, and to its end.
+    assert "series 2 of 3" in spoken_after(browser, "ArrowDown")
+    assert "Point 25 of 25" in spoken_after(browser, "End")
+    assert "Point 25 of 25" in spoken_after(browser, "ArrowRight")
+    assert "series 1 of 3" in spoken_after(browser, "ArrowUp")
+    assert spoken_after(browser, "Home") == first
+    assert ring_of(browser, chart) == pytest.approx(start)
+    assert spoken_after(browser, "Escape") == ""
+    assert ring_of(browser, chart) is None
+    assert browser.complaints == []
+
+
+def test_every_chart_tells_its_points(browser, whole):
+    show(browser, whole)
+    count = browser.evaluate("document.querySelectorAll('.walk').length")
+    assert count >= 18
+    for i in range(count):
+        chart = WALK.format(i)
+        browser.evaluate(f"{chart}.focus()")
+        first, last = (
+            spoken_after(browser, "ArrowRight"),
+            spoken_after(browser, "End"),
+        )
+        for said in (first, last):
+            assert re.match(r".*\d.*\. Point \d+ of \d+", said), said
+            assert len(said.partition(". Point")[0]) > 4
+        assert first != last
+        # The mark lies on the drawing.
+        assert all(0.0 < place < 1.0 for place in ring_of(browser, chart))
+    assert browser.complaints == []
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_the_page_can_be_read_by_all(browser, demo, size, theme):
+    show(browser, demo, size, theme)
+    assert accessibility.serious_faults(browser) == []
