@@ -399,7 +399,13 @@ class TrialRunner:
     def check_stroke(
         self, gaze: GazeOutcome, recording: Recording, heard: bool
     ) -> Verdict:
-        """What is said of a stroke that has just ended; see `verdict`."""
+        """What is said of a stroke that has just ended; see `verdict`.
+
+        Args:
+            gaze: Search before the stroke.
+            recording: The stroke.
+            heard: Whether its sound was a hit's.
+        """
         if self.injection is not None:
             self.injection.afterwards(gaze, recording, heard)
         return self.verdict
