@@ -14,7 +14,7 @@ from drake_affetto.pneumatics import (
     PneumaticDriver,
 )
 
-GAINS = JointGains(kP=1e6, kI=1e6, kD=4e4, kF=4e-6)
+GAINS = JointGains(kP=1e6, kI=1.5e6, kD=4e4, kF=4e-6)
 
 builder = DiagramBuilder()
 plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=0.001)

@@ -233,6 +233,6 @@ def test_without_mouse_spring_there_is_a_clear_message(
 ):
     monkeypatch.setattr(mouse_teacher, "_STIFFNESS", "no such field")
     out = tmp_path / "t.h5"
-    assert cli.main(["teach", "--by-hand", "--out", str(out)]) == 2
+    assert cli.main(["teach", "--mouse", "--out", str(out)]) == 2
     assert "needs a Drake whose Meshcat" in capsys.readouterr().err
     assert not out.exists()

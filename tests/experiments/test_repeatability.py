@@ -33,9 +33,9 @@ def test_lag_is_the_shift_of_a_shifted_course():
 
 def test_repeats_scatter_as_a_real_robots_do(repeated):
     scatter = dict(zip(repeated.joints, 100.0 * repeated.scatter, strict=True))
-    # The real robot's joints have 0.5 to 1.5 %. Here the yaw, which hardly moves
-    # in a stroke, sticks and repeats better than that; the elevation, of a short
-    # range and with the whole arm on it, worse.
+    # The real robot's joints have 0.5 to 1.5 %. Here the yaw, which hardly
+    # moves in a stroke, sticks and repeats better than that; the elevation, of
+    # a short range and with the whole arm on it, worse.
     assert 0.03 < scatter.pop("waist_yaw") < 0.5
     assert 0.5 < scatter.pop("right_shoulder_elevation") < 3.0
     assert 0.35 < min(scatter.values()) < max(scatter.values()) < 1.6

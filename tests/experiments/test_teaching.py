@@ -179,7 +179,7 @@ def run(spec):
     return test_teaching.fake_trial(spec)
 
 tasks.run_task = run
-sys.exit(cli.main(["teach", "--workers", "0", "--positions", "40",
+sys.exit(cli.main(["teach", "--workers", "0", "--demonstrations", "40",
                    "--out", sys.argv[2]]))
 """
 
@@ -347,7 +347,7 @@ def test_the_robot_is_taught(tmp_path):
     mine.write_text("extends: drumming\ncamera: {renderer: analytic}\n")
     path = tmp_path / "taught.h5"
     done = cli.main(
-        ["teach", "--scenario", str(mine), "--positions", "2"]
+        ["teach", "--scenario", str(mine), "--demonstrations", "2"]
         + ["--workers", "0", "--seed", "3", "--out", str(path)]
     )
     assert done == 0

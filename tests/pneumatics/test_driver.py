@@ -223,7 +223,7 @@ model_drivers:
       period: 0.002
       parameters: !ControlParameters
         gains:
-          large: {kP: 1.0e6, kI: 1.0e6, kD: 4.0e4, kF: 4.0e-6}
+          large: {kP: 1.0e6, kI: 1.5e6, kD: 4.0e4, kF: 4.0e-6}
   two_link_arm_1: !ZeroForceDriver {}
 """
 

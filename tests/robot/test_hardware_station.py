@@ -23,11 +23,14 @@ from drake_affetto.station.station import AffettoStation
 from support.serving import serving
 from support.wire_client import free_ports
 
-# A share of the gains of flow mode, where the inner loop is faster.
-GAIN = 0.6
+# Shares of the gains of flow mode, kP, kI and kD: the inner loop is slower over
+# the wire, and with less the hand does not come down to the drum.
+SHARES = 1.2, 0.6, 0.75
 MEAN = 401.3e3  # Pa, 300 kPa gauge
 # Time in which the arm comes to the start of the stroke, s.
 APPROACH = 3.0
+# The wire has its jitter: of so many strokes one may pass above the drum.
+STROKES = 3
 SHARED = ("estimated_state", "chamber_pressure")
 ELBOW = 11
 
@@ -136,16 +139,23 @@ def test_a_scenario_without_hardware_is_simulated():
 
 
 def taught_stroke():
-    """A demonstration at the default place, replayed: t (T,), q (T, n)."""
+    """A demonstration at the default place, replayed thrice: (T,), (T, n).
+
+    Between two strokes the arm rests for a second.
+    """
     scenario = load_scenario("drumming")
     scenario.active_joints = load_wire().names
     runner = TrialRunner(scenario)
     xy = np.array(scenario.world.drum_position)
-    theta = runner.teach(xy, seed=0).theta
+    # Firmly: over the wire the hand stays above the taught path.
+    theta = runner.teach(xy, seed=0, attempt=3).theta
     replay = runner.strike(xy, theta, seed=0)
     fresh = np.append(True, np.diff(replay.joint_t) > 1e-6)
     q = replay.desired_state[:, : len(scenario.active_joints)]
-    return replay.joint_t[fresh], q[fresh]
+    t, q = replay.joint_t[fresh], q[fresh]
+    pause = t[-1] - t[0] + 1.0
+    again = np.concatenate([t + k * pause for k in range(STROKES)])
+    return again, np.tile(q, (STROKES, 1))
 
 
 def pidf_over_the_wire(station, t, q):
@@ -154,7 +164,10 @@ def pidf_over_the_wire(station, t, q):
     parameters = load_control(config.parameters, config.overlays)
     for gains in parameters.gains.values():
         gains.kP, gains.kI, gains.kD = (
-            GAIN * each for each in (gains.kP, gains.kI, gains.kD)
+            share * each
+            for share, each in zip(
+                SHARES, (gains.kP, gains.kI, gains.kD), strict=True
+            )
         )
     builder = DiagramBuilder()
     builder.AddSystem(station)

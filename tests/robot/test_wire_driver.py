@@ -93,6 +93,8 @@ def test_impossible_sensors_do_not_keep_the_link_alive(bench, packet):
         robot.send(packet)
         step(simulator)
         time.sleep(0.01)
+    # On a busy machine the last step may have come before that time.
+    step(simulator)
     trusted, _, bad = link(driver, context)
     assert trusted == 0.0
     assert bad >= 5

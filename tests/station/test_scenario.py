@@ -387,6 +387,13 @@ def test_every_field_is_read_by_what_it_configures(monkeypatch, tmp_path):
     theta = runner.teach(xy, 1).theta
     runner.strike(xy, theta, 1)
     TrialRunner(load_scenario(fisheye)).gaze(xy, 1)
+    faulted = tmp_path / "faulted.yaml"
+    faulted.write_text(
+        "extends: supervised\nfaults:\n- {kind: joint_offset, size: 0.1, "
+        "joint: right_elbow_flexion, onset: 0.02}\n"
+        "- {kind: pressure_stuck, channel: b, joint: right_elbow_flexion}\n"
+    )
+    TrialRunner(load_scenario(faulted)).gaze(xy, 1)
     easy = load_scenario("easy_drumming")
     draw_positions(easy, 2, np.random.default_rng(0))
     t = np.linspace(0.0, 3.0, 50)

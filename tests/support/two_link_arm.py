@@ -14,7 +14,7 @@ from drake_affetto.pneumatics.driver import (
 from drake_affetto.pneumatics.parameters import JointActuator
 
 FILE = str(models_dir() / "sdf/two_link_arm.sdf")
-GAINS = JointGains(kP=1e6, kI=1e6, kD=4e4, kF=4e-6)
+GAINS = JointGains(kP=1e6, kI=1.5e6, kD=4e4, kF=4e-6)
 
 
 def add_plant(builder, time_step=0.001, models=1):

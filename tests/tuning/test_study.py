@@ -330,6 +330,7 @@ def test_the_text_of_the_fingerprint_stays():
         PidfGains([1.0], [2.0], [3.0], [4.0]),
         ControlParameters(),
         PneumaticParameters(
+            supply_pressure=659.3e3,
             classes={"elbow": ActuatorClass()},
             joints={"joint": JointActuator(actuator="elbow")},
         ),
