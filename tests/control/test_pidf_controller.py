@@ -256,9 +256,13 @@ def test_arm_holds_against_gravity_without_a_limit_cycle(body, share):
     assert np.all(np.max(error, axis=1) < 1.0)
     spread = np.std(angles[:, 300:], axis=1) / (body.upper - body.lower)
     assert np.all(spread < 0.005)
-    # The mean pressures stay where the underlap pins them.
+    # The arm's mean pressures stay where the underlap pins them; the waist,
+    # which sways within the spread above, lets a little air in and out.
     mean = 0.5 * (pressures[: body.n] + pressures[body.n :])
-    assert np.max(np.abs(mean[:, -1] - mean[:, 0])) < 30e3
+    moved = np.abs(mean[:, -1] - mean[:, 0])
+    waist = [name.startswith("waist") for name in ACTIVE_JOINTS]
+    assert np.max(moved[np.logical_not(waist)]) < 30e3
+    assert np.max(moved[waist]) < 80e3
 
 
 def test_arm_reaches_another_posture_and_rests_there(body):
