@@ -304,7 +304,7 @@ def test_a_signal_ends_it_in_one_line_and_shows_the_cursor(name, said):
     assert process.stderr.readline() == "ready\n"
     number = getattr(signal, name)
     process.send_signal(number)
-    out, err = process.communicate(timeout=20)
+    out, err = process.communicate(timeout=60)
     assert process.returncode == 128 + number
     assert err == f"affetto: {said}\n"
     assert out.rindex("\x1b[?25h") > out.rindex("\x1b[?25l")
