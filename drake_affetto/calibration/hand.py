@@ -72,6 +72,21 @@ class HandEstimate:
     correction: Array
 
 
+def hand_pixels(
+    robot: RobotKnowledge, planes: Array, reference: Array, readings: Array
+) -> Array:
+    """Where the hand's marker shows in mirrors (..., 2), px; NaN: nowhere.
+
+    Args:
+        robot: The robot's model of itself.
+        planes: Mirrors' planes (..., 3).
+        reference: Their reference point (3,), m.
+        readings: Readings of the joints (..., n), rad.
+    """
+    image = reflect(planes, reference, robot.hand(readings))
+    return robot.pixels(robot.eye(readings), image)
+
+
 class HandProblem:
     """Where the hand shows, by a plane and a correction of the model.
 
@@ -112,8 +127,7 @@ class HandProblem:
     def pixels(self, unknowns: Array, readings: Array) -> Array:
         """Where the marker shows (m, 2) at readings (m, n), px."""
         robot = self.knowledge.corrected(self.correction(unknowns))
-        image = reflect(unknowns[:3], self.reference, robot.hand(readings))
-        uv = robot.pixels(robot.eye(readings), image)
+        uv = hand_pixels(robot, unknowns[:3], self.reference, readings)
         return np.where(np.isfinite(uv), uv, 1e4)
 
     def beforehand(self, unknowns: Array) -> Array:

@@ -11,6 +11,7 @@ from drake_affetto.calibration.hand import (
     HandLook,
     HandProblem,
     estimate_from_hand,
+    hand_pixels,
 )
 from drake_affetto.calibration.knowledge import (
     KnowledgeErrors,
@@ -108,8 +109,7 @@ class PostureChooser:
         robot, reference = self._knowledge, self._problem.reference
         log = np.zeros(len(self._planes))
         for look in looks:
-            image = reflect(self._planes, reference, robot.hand(look.readings))
-            uv = robot.pixels(robot.eye(look.readings), image)
+            uv = hand_pixels(robot, self._planes, reference, look.readings)
             if look.pixel is None:
                 log += np.log(_ABSENT) * robot.camera.inside(uv)
             else:
@@ -143,10 +143,9 @@ class PostureChooser:
         no = np.full(uv.shape[:-1], 0.4)
         for look in looks:
             if look.pixel is None:
-                image = reflect(
-                    planes, self._problem.reference, robot.hand(look.readings)
+                at = hand_pixels(
+                    robot, planes, self._problem.reference, look.readings
                 )
-                at = robot.pixels(robot.eye(look.readings), image)
                 at = np.nan_to_num(at, nan=-1e4)[..., None, :]
             else:
                 at = look.pixel
@@ -181,13 +180,10 @@ class PostureChooser:
 
 def _expected(estimate: HandEstimate, readings: Array) -> Array:
     """Pixels (m, 2) at which the hand should show at readings (m, n)."""
-    robot = estimate.knowledge
-    image = reflect(
-        estimate.plane.parameters,
-        estimate.plane.reference,
-        robot.hand(readings),
+    plane = estimate.plane
+    uv = hand_pixels(
+        estimate.knowledge, plane.parameters, plane.reference, readings
     )
-    uv = robot.pixels(robot.eye(readings), image)
     return np.nan_to_num(uv, nan=1e4)
 
 

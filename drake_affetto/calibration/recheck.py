@@ -5,11 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from drake_affetto.calibration.config import WatchConfig
-from drake_affetto.calibration.hand import HandLook
+from drake_affetto.calibration.hand import HandLook, hand_pixels
 from drake_affetto.calibration.knowledge import RobotKnowledge
 from drake_affetto.calibration.plane import PlaneEstimate
 from drake_affetto.common.typing import Array
-from drake_affetto.geometry.planes import reflect
 
 
 class HandRecheck:
@@ -77,11 +76,9 @@ class HandRecheck:
         """How far the marker is off where the plane has it, px."""
         if look.pixel is None:
             return np.inf
-        robot = self._knowledge
-        plane = self._plane.from_point(robot.eye_position)
-        image = reflect(
-            plane.parameters, plane.reference, robot.hand(look.readings)
+        plane = self._plane
+        uv = hand_pixels(
+            self._knowledge, plane.parameters, plane.reference, look.readings
         )
-        uv = robot.pixels(robot.eye(look.readings), image)
         off = float(np.linalg.norm(uv - look.pixel))
         return off if np.isfinite(off) else np.inf

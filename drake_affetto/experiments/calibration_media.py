@@ -8,15 +8,13 @@ from drake_affetto.calibration.config import load_self_calibration
 from drake_affetto.experiments.episode import TrialRunner
 from drake_affetto.experiments.media import Scene, record_replay
 from drake_affetto.experiments.mirror_looks import IMAGES, look_from_here
+from drake_affetto.experiments.results.self_calibration import REPLAY
 from drake_affetto.experiments.self_calibration import (
     Calibrated,
     MirroredSkill,
     Repeat,
 )
 from drake_affetto.station.scenario import load_scenario
-
-REPLAY = "self_calibration.html"
-"""Name of the replay in a study's folder."""
 
 # So many of the looks are shown, one after another.
 _LOOKS = 4

@@ -43,6 +43,7 @@ from drake_affetto.experiments.skills import (
 )
 from drake_affetto.experiments.statistics import (
     invalid_count,
+    is_valid,
     success_rate,
 )
 from drake_affetto.experiments.trials import (
@@ -175,7 +176,7 @@ def run_drum(
         )
         for test in tests
         # Neither judged nor learned from.
-        if not ((strike := strikes[test]) and strike.invalid)
+        if is_valid(strikes[test])
     ]
     skilled = [each for each in outcomes if each.test.order != _BLIND]
     results = _make_results(plan, scenario, demonstrations, skilled)

@@ -41,6 +41,7 @@ from drake_affetto.experiments.statistics import (
     compare_landing,
     correct_primary,
     invalid_count,
+    is_valid,
     scheme_cell,
     success_table,
 )
@@ -340,7 +341,7 @@ def _make_results(
             successes[name] = success_table(strikes)
             landings[name] = np.array(
                 [
-                    [s.landing if s and not s.invalid else np.nan for s in row]
+                    [s.landing if s and is_valid(s) else np.nan for s in row]
                     for row in strikes
                 ]
             )

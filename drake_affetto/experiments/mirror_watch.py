@@ -44,8 +44,7 @@ class _Watching:
         repeat: Its repeat.
         alarm: Whether it takes its belief to be wrong now.
         alarm_by_strokes: Whether strokes alone would say so.
-        suspects: Whether it has to look at its hand again.
-        recheck: Looks at the hand that decide.
+        recheck: Looks at the hand that decide, where it suspects something.
     """
 
     def __init__(
@@ -63,13 +62,8 @@ class _Watching:
         )
         self._strokes = StrokeWatch(self._config)
         self._suspicion = StrokeWatch(self._config, self._config.suspicion)
-        self.alarm = self.alarm_by_strokes = self.suspects = False
-        self.recheck = self._new_recheck()
-
-    def _new_recheck(self) -> HandRecheck:
-        found = self._found
-        assert found.plane is not None
-        return HandRecheck(found.known, found.plane, found.seen, self._config)
+        self.alarm = self.alarm_by_strokes = False
+        self.recheck: HandRecheck | None = None
 
     def choose(self, gaze: GazeResult) -> Stroke | None:
         """The stroke at a drum; None where it is not found."""
@@ -97,15 +91,25 @@ class _Watching:
             if stroke is not None:
                 alarm |= watch.add(stroke.chance, sounded(struck))
             alarms.append(alarm)
-        self.alarm_by_strokes, self.suspects = alarms
-        self.recheck = self._new_recheck()
+        self.alarm_by_strokes, suspects = alarms
+        found = self._found
+        assert found.plane is not None
+        self.recheck = (
+            HandRecheck(found.known, found.plane, found.seen, self._config)
+            if suspects
+            else None
+        )
 
     def decide(self) -> None:
         """Takes in what the looks at the hand have decided."""
-        self.alarm = self.suspects and bool(self.recheck.moved)
-        if self.suspects:
+        self.alarm = self.recheck is not None and bool(self.recheck.moved)
+        if self.recheck is not None:
             self._suspicion.reset()
-        self.suspects = False
+
+    @property
+    def looks(self) -> int:
+        """Number of looks at its hand after the last stroke."""
+        return 0 if self.recheck is None else self.recheck.looks
 
     def go_on(self) -> None:
         """Goes on after an alarm, as after a calibration."""
@@ -177,7 +181,7 @@ def watch(
         for i, robot in robots.items():
             false[i] += robot.alarm
             false_by_strokes[i] += robot.alarm_by_strokes
-            looks[i] += robot.recheck.looks
+            looks[i] += robot.looks
             robot.go_on()
             if k + 1 == plan.quiet:
                 robot.begin_anew()
@@ -248,7 +252,9 @@ def _look_again(
 ) -> None:
     """Robots that suspect something look at their hands until it is clear."""
     suspects = {
-        robot.repeat.number: robot.recheck for robot in robots if robot.suspects
+        robot.repeat.number: robot.recheck
+        for robot in robots
+        if robot.recheck is not None
     }
     for number in range(study.settings.watch.recheck_looks):
         open_ = {i: one for i, one in suspects.items() if one.moved is None}

@@ -55,3 +55,9 @@ class Recording:
     valve_opening: Array
     sound: Array
     sound_rate: float
+
+    @property
+    def impulse(self) -> float:
+        """Impulse on the head, N s; for judging only."""
+        step = self.t[1] - self.t[0]
+        return float(self.contact_force[:, 0].sum() * step)

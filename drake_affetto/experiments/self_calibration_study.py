@@ -52,6 +52,7 @@ from drake_affetto.experiments.stroke_courses import (
     strokes_result,
 )
 from drake_affetto.experiments.trials import (
+    MOST_RUNNERS,
     at_mirror,
     demonstration,
     run_trials,
@@ -62,8 +63,9 @@ from drake_affetto.runner.executor import TrialExecutor
 _TEST, _SAMPLES = range(300, 302)
 _BODIES = 307
 
-# Repeats of own bodies that run side by side: workers keep so many stations.
-_TOGETHER = 3
+# Repeats of own bodies that run side by side: a worker keeps a station of each,
+# and that of the direct view, in which the last skill was taught.
+_TOGETHER = MOST_RUNNERS - 1
 
 # Half the length of a mirror's line in a picture, m.
 _REACH = 0.3

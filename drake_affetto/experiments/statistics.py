@@ -43,16 +43,21 @@ def success_table(
     """
     return np.array(
         [
-            [np.nan if s and s.invalid else sounded(s) for s in row]
+            [sounded(s) if is_valid(s) else np.nan for s in row]
             for row in strikes
         ],
         float,
     )
 
 
+def is_valid(strike: StrikeResult | None) -> bool:
+    """Whether a strike is judged: the supervisor passes it, or it was none."""
+    return strike is None or not strike.invalid
+
+
 def invalid_count(strikes: Iterable[StrikeResult | None]) -> int:
     """How many strikes the supervisor does not pass."""
-    return sum(bool(strike and strike.invalid) for strike in strikes)
+    return sum(not is_valid(strike) for strike in strikes)
 
 
 def scheme_cell(
@@ -67,12 +72,7 @@ def scheme_cell(
         InputError: If there is no strike.
     """
     successes = success_table(strikes)
-    flat = [
-        strike
-        for row in strikes
-        for strike in row
-        if strike is None or not strike.invalid
-    ]
+    flat = [strike for row in strikes for strike in row if is_valid(strike)]
     require(bool(flat), "strikes", "none that is valid", "at least one")
     return SchemeCell(
         success_rate(successes),

@@ -103,9 +103,8 @@ def run_separation_trial(spec: Spec) -> Result:
     if spec["kind"] == "movement":
         return {}, {"theta": _taught(trials, xy, seed, spec["lower"])}
     recording = trials.strike(xy, np.asarray(spec["theta"]), seed)
-    step = float(np.mean(np.diff(recording.t)))
     struck = Struck(
-        impulse=float(step * recording.contact_force[:, 0].sum()),
+        impulse=recording.impulse,
         peak=float(recording.contact_force[:, 0].max()),
         shell=float(recording.knock_force[:, 0].max()),
         table=float(recording.knock_force[:, 1].max()),

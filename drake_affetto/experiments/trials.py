@@ -70,7 +70,7 @@ _RUNNERS: dict[Content, tuple[str, TrialRunner]] = {}
 # Each keeps a Diagram with its renderers, some 50 MiB, after trials twice that.
 # A study of many bodies goes from one to the next and does not come back;
 # others have two scenarios.
-_MOST_RUNNERS = 4
+MOST_RUNNERS = 4
 
 NAME = "@name"
 """Entry of a spec's scenario that says what leads to it."""
@@ -112,7 +112,7 @@ def runner_of(entry: Mapping[str, Any]) -> TrialRunner:
             if source == name:
                 del _RUNNERS[old]
         # The least recently built of too many goes, before there is one more.
-        while len(_RUNNERS) >= _MOST_RUNNERS:
+        while len(_RUNNERS) >= MOST_RUNNERS:
             del _RUNNERS[next(iter(_RUNNERS))]
         built = TrialRunner(loaded)
         # It may have been edited while it was read.
@@ -579,11 +579,9 @@ def _run_ellipse_look(trials: TrialRunner, spec: Spec) -> EllipseLookResult:
 
 def _contact(recording: Recording) -> dict[str, float]:
     """What happened, to compare the reward with: it does not know of it."""
-    force = recording.contact_force[:, 0]
-    step = recording.t[1] - recording.t[0]
     return {
-        "max_force": float(force.max()),
-        "impulse": float(force.sum() * step),
+        "max_force": float(recording.contact_force[:, 0].max()),
+        "impulse": recording.impulse,
     }
 
 

@@ -86,12 +86,10 @@ def _run(
         trials.advance(trials.context.get_time() + _AFTERWARDS)
     after = _greatest(trials)
     verdict = trials.verdict
-    onsets = [
-        fault.span(begin, start)[0]
-        for fault in injection.faults
-        if math.isfinite(fault.span(begin, start)[0])
-    ]
-    step = trials.scenario.plant_config.time_step
+    onset = min(
+        (fault.span(begin, start)[0] for fault in injection.faults),
+        default=math.inf,
+    )
     result = WatchedResult(
         found=gaze.found,
         tau=gaze.task_parameter.tolist(),
@@ -99,12 +97,10 @@ def _run(
         heard=heard,
         invalid=verdict.reason,
         detected_at=verdict.time - begin if not verdict.valid else None,
-        onset=min(onsets) - begin if onsets else None,
+        onset=onset - begin if math.isfinite(onset) else None,
         movement_at=start - begin if math.isfinite(start) else None,
         max_force=max(force, after[0]),
-        impulse=0.0
-        if recording is None
-        else float(recording.contact_force[:, 0].sum() * step),
+        impulse=0.0 if recording is None else recording.impulse,
         max_speed=max(speed, after[1]),
         scores=injection.scores.astype(np.float32),
     )

@@ -15,6 +15,7 @@ from drake_affetto import __version__
 from drake_affetto.common.errors import InputError, require
 from drake_affetto.common.typed_json import from_plain
 from drake_affetto.experiments.results import STUDY_RESULTS, read_study
+from drake_affetto.experiments.results.self_calibration import REPLAY
 from drake_affetto.tuning.results import TuningResults
 
 # The kinds of study that the page shows.
@@ -26,7 +27,7 @@ _BODIES = {"mirror": "bodies", "drum": "drum_bodies"}
 # What a study's folder can hold beside its numbers, and what kind it is of.
 MEDIA = {
     "replay.html": "text/html",
-    "self_calibration.html": "text/html",
+    REPLAY: "text/html",
     "camera_direct.png": "image/png",
     "camera_mirror.png": "image/png",
     "trial.png": "image/png",

@@ -14,7 +14,7 @@ import nbclient
 import nbformat
 import pytest
 
-from support import accessibility, headless_browser, site
+from support import accessibility, site
 
 pytestmark = pytest.mark.slow
 
@@ -41,16 +41,6 @@ def built(tree):
     done = site.build(tree, RUN)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
     return tree / "out/docs"
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    program = headless_browser.find()
-    if program is None:
-        pytest.skip("no Chromium or Chrome on this machine")
-    profile = tmp_path_factory.mktemp("profile")
-    with headless_browser.Browser(program, profile) as found:
-        yield found
 
 
 class Links(HTMLParser):

@@ -5,18 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from support import accessibility, headless_browser
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    program = headless_browser.find()
-    if program is None:
-        pytest.skip("no Chromium or Chrome on this machine")
-    profile = tmp_path_factory.mktemp("profile")
-    with headless_browser.Browser(program, profile) as found:
-        yield found
-
+from support import accessibility
 
 SIZES = {"laptop": (1280, 800, False), "phone": (390, 844, True)}
 

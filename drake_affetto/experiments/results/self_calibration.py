@@ -10,6 +10,9 @@ from drake_affetto.experiments.results.rates import (
     SuccessRate,
 )
 
+REPLAY = "self_calibration.html"
+"""Name of the 3D replay in the study's folder."""
+
 
 @dataclasses.dataclass(frozen=True)
 class PlaneRow:

@@ -10,6 +10,7 @@ import struct
 
 import numpy as np
 
+from drake_affetto.experiments.results.self_calibration import REPLAY
 from drake_affetto.report.parts import (
     Picture,
     Section,
@@ -21,9 +22,6 @@ from drake_affetto.report.report_data import ReportData
 from drake_affetto.report.study_folder import StudyFolder, read_media
 
 REPLAY_TITLE = "3D replay of a direct and a mirrored trial"
-
-CALIBRATION = "self_calibration.html"
-"""Name of the replay that belongs to another section."""
 
 _CAMERA = (
     (
@@ -81,9 +79,7 @@ def make(data: ReportData) -> Section | None:
 
 def _media(folder: StudyFolder) -> dict[str, Path]:
     """What a folder holds of this section's media."""
-    return {
-        name: path for name, path in folder.media.items() if name != CALIBRATION
-    }
+    return {name: path for name, path in folder.media.items() if name != REPLAY}
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """No demonstration at all: the robot finds the mirror by itself."""
 
 from drake_affetto.experiments.results.self_calibration import (
+    REPLAY,
     MethodResult,
     SelfCalibrationResults,
 )
@@ -11,7 +12,7 @@ from drake_affetto.report.charts.self_calibration import (
 )
 from drake_affetto.report.parts import Section, Table, make_table
 from drake_affetto.report.report_data import ReportData
-from drake_affetto.report.sections.media import CALIBRATION, make_replay
+from drake_affetto.report.sections.media import make_replay
 
 
 def make(data: ReportData) -> Section | None:
@@ -21,7 +22,7 @@ def make(data: ReportData) -> Section | None:
         return None
     results = folder.results
     found = results.self_calibration
-    replay = folder.media.get(CALIBRATION)
+    replay = folder.media.get(REPLAY)
     charts = [
         chart
         for chart in (
