@@ -2,10 +2,13 @@
 
 import os
 
-# One thread a process, no display, and what Drake will drop is an error.
+# One thread a process, no display, no colors in what programs say (some add
+# them where CI is set), and what Drake will drop is an error.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("MPLBACKEND", "Agg")
+os.environ["NO_COLOR"] = "1"
+os.environ.pop("FORCE_COLOR", None)
 os.environ.setdefault("DRAKE_DEPRECATION_RUNTIME_SEVERITY", "error")
 
 import hypothesis
