@@ -9,6 +9,7 @@ Long: all that one runner does with its one Diagram.
 
 from collections.abc import Callable, Sequence
 import dataclasses
+import math
 
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatVisualizerParams, SceneGraph
@@ -36,7 +37,7 @@ from drake_affetto.sound.reward import (
     spectrogram,
     tap_prototypes,
 )
-from drake_affetto.sound.voice import DrumVoice
+from drake_affetto.sound.voice import DrumVoice, microphone_noise
 from drake_affetto.station.scenario import Scenario
 from drake_affetto.station.station import AffettoStation
 from drake_affetto.teaching.stroke import draw_stroke
@@ -46,6 +47,8 @@ RINGING = 0.3
 
 # Steps in which a search with the gaze is simulated, s.
 FRAME_PERIOD = 0.05
+# The gaze gives a turn back within so long, s.
+_PATIENCE = 5.0
 
 
 @dataclasses.dataclass
@@ -352,15 +355,29 @@ class TrialRunner:
         outcome = self.look(xy, seed)
         if not outcome.found:
             return outcome, None
+        start = self.await_movement(regressor)
+        if math.isinf(start):
+            raise RuntimeError("the gaze has settled but is never ready")
+        return outcome, self.record(start, seed)
+
+    def await_movement(self, regressor: Regressor) -> float:
+        """Waits until the gaze has settled and the skill has been asked.
+
+        Args:
+            regressor: Skill, from task parameters to θ.
+
+        Returns:
+            The movement's start, s; inf if the gaze does not settle within
+            5 s, or the supervisor ends the trial before.
+        """
         policy = self._sub(self.station.policy)
         self.station.policy.set_regressor(policy, regressor)
-        limit = self.context.get_time() + 5.0
+        limit = self.context.get_time() + _PATIENCE
         while not self.station.policy.is_latched(policy):
-            if self.context.get_time() > limit:
-                raise RuntimeError("the gaze has settled but is never ready")
+            if self.context.get_time() > limit or not self.verdict.valid:
+                return math.inf
             self.advance(self.context.get_time() + FRAME_PERIOD)
-        start = float(self.port("affetto.start_time")[0])
-        return outcome, self.record(start, seed)
+        return float(self.port("affetto.start_time")[0])
 
     def look(self, xy: Array, seed: int) -> GazeOutcome:
         """The search for the drum, at whose end the station then is.
@@ -553,7 +570,7 @@ class TrialRunner:
             knock[:, 0],
             knock[:, 1],
             np.abs(flow),
-            np.random.default_rng([seed, 0x50BD]),
+            microphone_noise(seed),
         )
         if self.injection is not None:
             sound = self.injection.hear(sound, start, start + float(t[0]))

@@ -35,7 +35,7 @@ from drake_affetto.sound.reward import (
     spectrogram,
     tap_prototypes,
 )
-from drake_affetto.sound.voice import DrumVoice
+from drake_affetto.sound.voice import DrumVoice, microphone_noise
 from drake_affetto.station.scenario import load_scenario
 
 
@@ -248,7 +248,7 @@ def sound_of(voice: DrumVoice, forces: Array, seed: int) -> Array:
         shell,
         table,
         flow,
-        np.random.default_rng([seed, 0x50BD]),
+        microphone_noise(seed),
     )
 
 

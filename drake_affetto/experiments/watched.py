@@ -11,7 +11,7 @@ import numpy as np
 
 from drake_affetto.common.errors import require
 from drake_affetto.common.typing import Array
-from drake_affetto.experiments.episode import FRAME_PERIOD, TrialRunner
+from drake_affetto.experiments.episode import TrialRunner
 from drake_affetto.experiments.fault_injection import FaultInjection
 from drake_affetto.experiments.recordings import Recording
 from drake_affetto.experiments.results.trial import WatchedResult
@@ -19,9 +19,6 @@ from drake_affetto.faults.config import Fault
 
 # So long is recorded after a trial has been ended, s: what the arm then does.
 _AFTERWARDS = 0.5
-
-# The gaze gives a turn back within so long, s.
-_PATIENCE = 5.0
 
 
 def run_watched(trials: TrialRunner, spec: Any) -> WatchedResult:
@@ -72,7 +69,7 @@ def _run(
     start = math.inf
     force, speed = 0.0, 0.0
     if gaze.found and trials.verdict.valid:
-        start = _await_movement(trials, spec["regressor"])
+        start = trials.await_movement(spec["regressor"])
     if gaze.found and trials.verdict.valid:
         # What was before the movement is forgotten as it begins.
         trials.advance(start)
@@ -105,18 +102,6 @@ def _run(
         scores=injection.scores.astype(np.float32),
     )
     return result, recording
-
-
-def _await_movement(trials: TrialRunner, regressor: Any) -> float:
-    """Waits until the skill has been asked; gives the movement's start, s."""
-    policy = trials.station.policy.GetMyMutableContextFromRoot(trials.context)
-    trials.station.policy.set_regressor(policy, regressor)
-    limit = trials.context.get_time() + _PATIENCE
-    while not trials.station.policy.is_latched(policy):
-        if trials.context.get_time() > limit or not trials.verdict.valid:
-            return math.inf
-        trials.advance(trials.context.get_time() + FRAME_PERIOD)
-    return float(trials.port("affetto.start_time")[0])
 
 
 def _greatest(trials: TrialRunner) -> tuple[float, float]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
         spectrogram,
         tap_prototypes,
     )
-    from drake_affetto.sound.voice import DrumVoice
+    from drake_affetto.sound.voice import DrumVoice, microphone_noise
     from drake_affetto.sound.voice_config import VoiceConfig
     from drake_affetto.sound.wav import write_wav
 
@@ -30,6 +30,7 @@ __getattr__, __dir__, __all__ = attach(
         "cut_prototype": "reward",
         "load_sound_config": "config",
         "reward_over_time": "reward",
+        "microphone_noise": "voice",
         "similarity": "reward",
         "spectrogram": "reward",
         "tap_prototypes": "reward",

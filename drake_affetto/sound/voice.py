@@ -40,6 +40,13 @@ from drake_affetto.sound.modes import (
 from drake_affetto.sound.ringing import ring
 from drake_affetto.sound.voice_config import VoiceConfig
 
+_MICROPHONE = 0x50BD
+
+
+def microphone_noise(seed: int) -> np.random.Generator:
+    """The generator of the microphone's noise in the trial of a seed."""
+    return np.random.default_rng([seed, _MICROPHONE])
+
 
 class DrumVoice:
     """Turns contact forces into the sound that a microphone records."""

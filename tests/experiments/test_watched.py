@@ -16,6 +16,7 @@ from drake_affetto.faults.config import Fault
 from drake_affetto.faults.supervision import CHECKS
 
 XY, SEED = [0.25, -0.1], 9
+ATMOSPHERE = 101.3e3
 
 
 @pytest.fixture(scope="module")
@@ -82,6 +83,23 @@ def test_faults_are_noticed_for_what_they_are(trial, fault, reason):
     assert found.detected_at >= found.onset
     if fault.kind == "hand_lost":
         assert found.impulse == 0.0
+
+
+def test_an_ended_trial_vents_or_holds_as_the_scenario_says(lesson, tmp_path):
+    path = tmp_path / "vents.yaml"
+    path.write_text("extends: supervised\nsupervisor: {on_invalid: vent}\n")
+    stuck = Fault(kind="joint_stuck", joint="right_shoulder_flexion", onset=0.5)
+    ends = {}
+    for action, scenario in (("hold", "supervised"), ("vent", str(path))):
+        found = run_trial(watched(scenario, XY, SEED, *lesson, [stuck]))
+        assert found.invalid.startswith("angle reading does not change")
+        ends[action] = (
+            found.detected_at,
+            runner(scenario).port("affetto.chamber_pressure") - ATMOSPHERE,
+        )
+    assert ends["vent"][0] == ends["hold"][0]
+    # Gauge, half a second afterwards.
+    assert np.all(ends["vent"][1] < 0.5 * ends["hold"][1])
 
 
 def test_a_drum_that_is_moved_away_is_seen_elsewhere(trial):
