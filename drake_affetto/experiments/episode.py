@@ -7,6 +7,7 @@ arguments alone, not on the trials before it.
 Long: all that one runner does with its one Diagram.
 """
 
+from collections import deque
 from collections.abc import Callable, Sequence
 import dataclasses
 import math
@@ -47,6 +48,9 @@ RINGING = 0.3
 
 # Steps in which a search with the gaze is simulated, s.
 FRAME_PERIOD = 0.05
+# Of so many of these at its end a search that failed mostly saw the marker, or
+# did not.
+_LAST_FRAMES = 20
 # The gaze gives a turn back within so long, s.
 _PATIENCE = 5.0
 
@@ -242,6 +246,7 @@ class TrialRunner:
         )
         self._enable_gaze()
         outcome = self._wait_for_gaze(begin, on_frame)
+        self._tell(outcome)
         end = self.context.get_time() + linger
         while self.context.get_time() < end - 1e-9:
             self._advance_frame(begin, on_frame)
@@ -403,6 +408,7 @@ class TrialRunner:
         self._copy(self._looked.end, self.context)
         if self.injection is not None:
             self.injection.resume()
+            self._tell(self._looked.outcome)
         self._clear_logs()
         self.simulator.Initialize()
         return self._looked.outcome
@@ -521,17 +527,26 @@ class TrialRunner:
         gaze, context = self.station.gaze, self._sub(self.station.gaze)
         settled = gaze.get_settled_output_port()
         failed = gaze.GetOutputPort("failed")
+        sightings: deque[bool] = deque(maxlen=_LAST_FRAMES)
         while not settled.Eval(context)[0] and not failed.Eval(context)[0]:
             if not self.verdict.valid:
                 break
             self._advance_frame(begin, on_frame)
+            sightings.append(bool(self.port("camera.blob")[2]))
+        found = bool(settled.Eval(context)[0])
         return GazeOutcome(
-            found=bool(settled.Eval(context)[0]),
+            found=found,
             task_parameter=np.array(
                 gaze.get_task_parameter_output_port().Eval(context)
             ),
             duration=self.context.get_time() - begin,
+            unseen=not found and sum(sightings) < 0.5 * len(sightings),
         )
+
+    def _tell(self, outcome: GazeOutcome) -> None:
+        """Has a supervisor know that a search has not seen the marker."""
+        if outcome.unseen and self.injection and self.verdict.valid:
+            self.injection.lost()
 
     def _advance_frame(
         self, begin: float, on_frame: Callable[[float], None] | None

@@ -13,11 +13,15 @@ class GazeOutcome:
         found: Whether the gaze settled on the marker.
         task_parameter: τ or τ̂ (2,); zeros if it did not settle.
         duration: Time that the search took, s.
+        unseen: Whether it did not settle and hardly saw the marker at its end.
+            If it did see it and did not come to rest, that is the robot's own
+            failure.
     """
 
     found: bool
     task_parameter: Array
     duration: float
+    unseen: bool = False
 
 
 @dataclasses.dataclass

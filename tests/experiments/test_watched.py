@@ -8,6 +8,7 @@ from drake_affetto.experiments.fault_injection import FaultInjection
 from drake_affetto.experiments.trials import (
     Movement,
     demonstration,
+    drumming,
     run_trial,
     runner,
     watched,
@@ -100,6 +101,28 @@ def test_an_ended_trial_vents_or_holds_as_the_scenario_says(lesson, tmp_path):
     assert ends["vent"][0] == ends["hold"][0]
     # Gauge, half a second afterwards.
     assert np.all(ends["vent"][1] < 0.5 * ends["hold"][1])
+
+
+def test_a_marker_that_shows_for_a_moment_at_the_end_is_not_found(lesson):
+    # The rim beside the sleeve was taken for a small marker in one of the last
+    # images, and the trial for a miss of the robot's own.
+    hidden = Fault(kind="marker_hidden", size=0.8, onset=0.8813)
+    xy = [0.30914656123518947, -0.1381642691176385]
+    found = run_trial(watched("supervised", xy, 1761854525, *lesson, [hidden]))
+    assert not found.found
+    assert found.invalid == "marker is not found"
+
+
+def test_other_trials_of_a_supervised_robot_know_of_it_too(lesson, tmp_path):
+    path = tmp_path / "hidden.yaml"
+    path.write_text(
+        "extends: supervised\nfaults:\n- {kind: marker_hidden, size: 1.0}\n"
+    )
+    spec = drumming(str(path), XY, SEED, *lesson)
+    # The second takes the search over from the first.
+    for _ in range(2):
+        found = run_trial(spec)
+        assert (found.success, found.invalid) == (False, "marker is not found")
 
 
 def test_a_drum_that_is_moved_away_is_seen_elsewhere(trial):
