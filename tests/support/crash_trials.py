@@ -47,6 +47,13 @@ FILES = {
     "direct.yaml": "extends: drumming\ncamera: {renderer: analytic}\n",
     "changed.yaml": "extends: mirror\ncamera: {renderer: analytic}\n",
     "short.yaml": SHORT,
+    "few.yaml": """
+joints: [right_shoulder_flexion]
+faults:
+- {kind: joint_stuck, span: [0.0, 1.0]}
+- {kind: pressure_offset, sizes: [2.0e+5], span: [0.0, 1.0]}
+- {kind: supply_lost, span: [0.0, 1.0]}
+""",
 }
 
 
@@ -256,6 +263,11 @@ JOBS = {
             rows=_taught_file,
             final=lambda out: taught(out / "lessons.h5"),
             results="lessons.h5",
+        ),
+        Job(
+            "faults",
+            "faults --demonstrations 4 --repeats 2 --catalog few.yaml "
+            "--out {out}",
         ),
         Job("toy", "toy --repeats 2 --seeds 10 --out {out}"),
         Job(
