@@ -355,12 +355,14 @@ class TrialRunner:
 
         Returns:
             The outcome of the gaze, and the recording (None if the drum was
-            not found).
+            not found, or a supervisor has ended the trial).
         """
         outcome = self.look(xy, seed)
         if not outcome.found:
             return outcome, None
         start = self.await_movement(regressor)
+        if not self.verdict.valid:
+            return outcome, None
         if math.isinf(start):
             raise RuntimeError("the gaze has settled but is never ready")
         return outcome, self.record(start, seed)

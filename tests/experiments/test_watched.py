@@ -125,6 +125,24 @@ def test_other_trials_of_a_supervised_robot_know_of_it_too(lesson, tmp_path):
         assert (found.success, found.invalid) == (False, "marker is not found")
 
 
+def test_a_trial_that_ends_while_the_skill_is_awaited_has_no_stroke(
+    lesson, tmp_path, monkeypatch
+):
+    found = runner("supervised").gaze(np.array(XY), SEED)
+    path = tmp_path / "jumps.yaml"
+    path.write_text(
+        "extends: supervised\nfaults:\n"
+        "- {kind: joint_offset, joint: right_shoulder_flexion, size: 0.3,\n"
+        f"   onset: {found.duration + 0.02}}}\n"
+    )
+    policy = runner(str(path)).station.policy
+    monkeypatch.setattr(policy, "is_latched", lambda _: False)
+    result = run_trial(drumming(str(path), XY, SEED, *lesson))
+    assert result.found
+    assert result.invalid.startswith("angle reading jumps")
+    assert (result.success, result.impulse) == (False, 0.0)
+
+
 def test_a_drum_that_is_moved_away_is_seen_elsewhere(trial):
     found = trial(Fault(kind="drum_moved", size=0.12, since="movement"))
     assert not found.heard
